@@ -2,8 +2,8 @@
 
 Under MPI every rank runs the same tests in the same order. What this file adds:
 
-* After each phase of a test the ranks compare outcomes. A test that failed on one rank is reported as failed by
-  all, with their messages, and nobody goes on to the next test alone.
+* After each phase of a test the ranks compare outcomes. A test that failed on one rank is reported as failed
+  by all, with their messages, and nobody goes on to the next test alone.
 * A rank that failed inside a collective call leaves the others waiting in it. After a grace period the rank
   that did come back prints what it knows and aborts the whole job: mpirun returns non-zero, nothing hangs.
   (`faulthandler_timeout` in pyproject.toml covers the case that all ranks hang.)
@@ -31,7 +31,7 @@ PATIENCE_SECONDS = 590.0
 
 
 def launched_ranks() -> int:
-    """Number of ranks, from the environment that MPICH or Open MPI sets; importing MPI is not needed for that."""
+    """Number of ranks, from the environment that MPICH or Open MPI sets; needs no import of MPI."""
     for name in ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE"):
         if name in os.environ:
             return int(os.environ[name])

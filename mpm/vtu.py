@@ -1,0 +1,162 @@
+"""The two VTK formats of a run: one binary `.vtu` per output time and the `.pvd` that lists them.
+
+`.vtu` is VTK's XML UnstructuredGrid with raw appended data: arrays are zlib-compressed (level 1) behind a UInt64
+header, little endian. ParaView, VisIt, pyvista and meshio read it; so do the few lines of `read_vtu`.
+Format: VTK User's Guide, "XML file formats".
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import xml.etree.ElementTree as ElementTree
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mpm.errors import MpmError
+
+VTK_QUAD = 9
+VTK_TYPE = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "uint8": "UInt8"}
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Contents of one `.vtu`: `points` (n, 3) [m], `quads` (cells, 4), `cell_data` by name, `time` [s]."""
+
+    points: NDArray[np.float64]
+    quads: NDArray[np.int32]
+    cell_data: dict[str, NDArray[np.generic]]
+    time: float
+
+    @property
+    def centres(self) -> NDArray[np.float64]:
+        """Cell centres (cells, 2) [m]."""
+        return self.points[self.quads, :2].mean(axis=1)
+
+
+def grid_points(
+    x: ArrayLike, y: ArrayLike, displacement: Sequence[float] = (0.0, 0.0)
+) -> NDArray[np.float64]:
+    """Points of a rectangular grid, row by row from the bottom, shape ((rows + 1) (columns + 1), 3)."""
+    xx, yy = np.meshgrid(np.asarray(x) + displacement[0], np.asarray(y) + displacement[1])
+    return np.column_stack([xx.ravel(), yy.ravel(), np.zeros(xx.size)])
+
+
+def grid_quads(columns: int, rows: int) -> NDArray[np.int32]:
+    """Corners of the cells, row by row from the bottom, in VTK's order (counter-clockwise), shape (cells, 4)."""
+    row, column = np.divmod(np.arange(rows * columns, dtype=np.int32), columns)
+    first = row * (columns + 1) + column
+    return np.column_stack([first, first + 1, first + columns + 2, first + columns + 1]).astype(np.int32)
+
+
+def encode_vtu(
+    points: NDArray[np.float64],
+    quads: NDArray[np.int32],
+    cell_data: Mapping[str, ArrayLike],
+    time: float,
+    precision: str = "Float32",
+) -> bytes:
+    """The bytes of a `.vtu` file.
+
+    `cell_data` holds arrays of shape (cells,), or (cells, 2) and (cells, 3) for vectors (padded to three components);
+    integers are stored as Int32, real numbers in `precision` (Float32 or Float64), coordinates always as Float64.
+    """
+    blocks: list[bytes] = []
+    offset = 0
+
+    def array(name: str, values: NDArray[np.generic]) -> str:
+        nonlocal offset
+        block = compressed_block(np.ascontiguousarray(values).tobytes())
+        components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
+        kind = VTK_TYPE[values.dtype.name]
+        line = f'<DataArray type="{kind}" Name="{name}"{components} format="appended" offset="{offset}"/>\n'
+        blocks.append(block)
+        offset += len(block)
+        return line
+
+    cells = len(quads)
+    real = np.dtype(precision.lower())
+    mesh = (
+        "<Points>\n" + array("Points", points) + "</Points>\n<Cells>\n"
+        + array("connectivity", quads.ravel())
+        + array("offsets", np.arange(4, 4 * cells + 1, 4, dtype=np.int32))
+        + array("types", np.full(cells, VTK_QUAD, dtype=np.uint8)) + "</Cells>\n"
+    )  # fmt: skip
+    fields = "".join(array(name, cell_array(name, values, cells, real)) for name, values in cell_data.items())
+    head = (
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
+        ' compressor="vtkZLibDataCompressor">\n<UnstructuredGrid>\n'
+        '<FieldData>\n<DataArray type="Float64" Name="TimeValue" NumberOfTuples="1" format="ascii">'
+        f"{time!r}</DataArray>\n</FieldData>\n"
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{cells}">\n{mesh}'
+        f"<CellData>\n{fields}</CellData>\n</Piece>\n</UnstructuredGrid>\n"
+        '<AppendedData encoding="raw">\n_'
+    )
+    return head.encode() + b"".join(blocks) + b"\n</AppendedData>\n</VTKFile>\n"
+
+
+def cell_array(name: str, values: ArrayLike, cells: int, real: np.dtype[np.generic]) -> NDArray[np.generic]:
+    """Check the shape, choose the stored type, pad vectors to three components."""
+    found = np.asarray(values)
+    if found.shape[:1] != (cells,) or found.ndim > 2 or (found.ndim == 2 and found.shape[1] not in (2, 3)):
+        raise MpmError(f"field {name}: shape {found.shape} where ({cells},) or ({cells}, 2) is needed")
+    found = found.astype(np.int32 if np.issubdtype(found.dtype, np.integer) else real)
+    if found.ndim == 2 and found.shape[1] == 2:
+        found = np.column_stack([found, np.zeros(cells, dtype=found.dtype)])
+    return found
+
+
+def compressed_block(raw: bytes) -> bytes:
+    """vtkZLibDataCompressor's layout with a single block: [blocks, block size, last partial size, compressed size] + data."""
+    packed = zlib.compress(raw, 1)
+    return struct.pack("<4Q", 1, len(raw), 0, len(packed)) + packed
+
+
+def read_vtu(path: str | Path) -> Snapshot:
+    """Read a file written by `encode_vtu` (this reader knows no other variant of the format)."""
+    content = Path(path).read_bytes()
+    head, _, appended = content.partition(b'<AppendedData encoding="raw">\n_')
+    if not appended:
+        raise MpmError(f"{path}: not a .vtu file written by mpm")
+    arrays: dict[str, NDArray[np.generic]] = {}
+    pattern = r'<DataArray type="(\w+)" Name="([^"]+)"(?: NumberOfComponents="(\d)")? format="appended" offset="(\d+)"/>'
+    for kind, name, components, offset in re.findall(pattern, head.decode()):
+        start = int(offset)
+        (_, _, _, size) = struct.unpack_from("<4Q", appended, start)
+        values = np.frombuffer(zlib.decompress(appended[start + 32 : start + 32 + size]), dtype=kind.lower())
+        arrays[name] = values.reshape(-1, int(components)) if components else values
+    found = re.search(rb'Name="TimeValue"[^>]*>([^<]+)<', head)
+    points, quads = arrays.pop("Points"), arrays.pop("connectivity").reshape(-1, 4)
+    del arrays["offsets"], arrays["types"]
+    return Snapshot(
+        points.astype(np.float64), quads.astype(np.int32), arrays, float(found[1]) if found else float("nan")
+    )
+
+
+def encode_pvd(steps: Sequence[tuple[float, str]]) -> str:
+    """The text of a `.pvd`: time [s] and path, relative to the `.pvd`, of every step."""
+    lines = "".join(
+        f'<DataSet timestep="{time!r}" group="" part="0" file="{name}"/>\n' for time, name in steps
+    )
+    return (
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+        f"<Collection>\n{lines}</Collection>\n</VTKFile>\n"
+    )
+
+
+def read_pvd(path: str | Path) -> list[tuple[float, Path]]:
+    """Time [s] and path of every step that a `.pvd` lists, in its order; empty when there is no such file."""
+    path = Path(path)
+    if not path.exists():
+        return []
+    try:
+        entries = ElementTree.parse(path).getroot().iter("DataSet")
+        return [(float(entry.attrib["timestep"]), path.parent / entry.attrib["file"]) for entry in entries]
+    except (ElementTree.ParseError, KeyError, ValueError) as error:
+        raise MpmError(f"{path}: not a readable .pvd file ({error})") from error

@@ -1,0 +1,274 @@
+"""The run directory: what is written can be read by others, survives a kill, and can be cut back."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpm.errors import InputError, MpmError
+from mpm.files import write_atomically
+from mpm.geometry import Grid
+from mpm.output import RunDirectory
+from mpm.vtu import read_pvd, read_vtu
+
+COLUMNS, ROWS = 12, 5
+
+
+@pytest.fixture
+def grid() -> Grid:
+    """Two layers with unequal rows and three zones: any mix-up of rows, columns or zones changes a value."""
+    return Grid(
+        x=np.linspace(0.0, 0.12, COLUMNS + 1),
+        y=np.array([-0.003, -0.001, 0.0, 0.004, 0.007, 0.012]),
+        row_layer=np.array([0, 0, 1, 1, 1]),
+        zone_of_column=np.repeat([1, 2, 3], 4),
+        layer_names=("bed", "headspace"),
+        periodic=True,
+    )
+
+
+def centres(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    x, y = 0.5 * (grid.x[1:] + grid.x[:-1]), 0.5 * (grid.y[1:] + grid.y[:-1])
+    return np.tile(x, grid.rows), np.repeat(y, grid.columns)
+
+
+def fields(grid: Grid, t: float) -> dict[str, np.ndarray]:
+    """Affine in x, y and t, so that a wrong cell order, mesh or time shows as a wrong value."""
+    x, y = centres(grid)
+    return {"C_TMA": 1 + 10 * x + 100 * y + 7 * t, "velocity": np.column_stack([x - t, y + t])}
+
+
+def write_run(directory: RunDirectory, grid: Grid, times: list[float]) -> None:
+    for t in times:
+        directory.write_fields(t, grid, fields(grid, t), displacement=(1e-3 * t, -2e-3 * t))
+        directory.append_history({"time": t, "balance.TMA": 1e-12 * t})
+
+
+TIMES = [0.0, 0.1, 0.30000000000000004, 2 / 3]
+
+
+@pytest.fixture
+def run(tmp_path: Path, grid: Grid) -> RunDirectory:
+    directory = RunDirectory(tmp_path / "run", precision="Float64")
+    directory.prepare()
+    write_run(directory, grid, TIMES)
+    return directory
+
+
+def test_pyvista_reads_all_steps(run: RunDirectory, grid: Grid) -> None:
+    """Fails when a value, a vector component, a cell's place, a zone or a time differs from what was written."""
+    pyvista = pytest.importorskip("pyvista")
+    reader = pyvista.get_reader(run.pvd)
+    assert list(reader.time_values) == TIMES
+    for index, t in enumerate(TIMES):
+        reader.set_active_time_point(index)
+        mesh = reader.read()[0]
+        x, y = centres(grid)
+        assert np.allclose(
+            mesh.cell_centers().points[:, :2], np.column_stack([x + 1e-3 * t, y - 2e-3 * t]), atol=1e-15
+        )
+        assert np.array_equal(mesh["C_TMA"], fields(grid, t)["C_TMA"])
+        assert (
+            np.array_equal(mesh["velocity"][:, :2], fields(grid, t)["velocity"])
+            and not mesh["velocity"][:, 2].any()
+        )
+        assert mesh.field_data["TimeValue"][0] == t
+        assert mesh.compute_cell_sizes()["Area"].sum() == pytest.approx(
+            0.12 * 0.015, rel=1e-12
+        )  # quads are not folded
+        for zone in (1, 2, 3):
+            assert mesh.threshold([zone, zone], scalars="zone").n_cells == 4 * ROWS
+        assert np.array_equal(mesh["layer"], np.repeat([0, 0, 1, 1, 1], COLUMNS))
+        assert mesh["zone"].dtype == np.int32
+
+
+def test_meshio_reads_a_step(run: RunDirectory, grid: Grid) -> None:
+    """Fails when meshio sees other cells, values or another time."""
+    meshio = pytest.importorskip("meshio")
+    mesh = meshio.read(run.path / run.steps[3][1])
+    assert mesh.cells[0].type == "quad" and len(mesh.cells[0].data) == grid.cells
+    middle = mesh.points[mesh.cells[0].data].mean(axis=1)
+    assert np.allclose(middle[:, 0], centres(grid)[0] + 1e-3 * TIMES[3], atol=1e-15)
+    assert np.array_equal(mesh.cell_data["C_TMA"][0], fields(grid, TIMES[3])["C_TMA"])
+    assert float(mesh.field_data["TimeValue"][0]) == TIMES[3]
+
+
+def test_a_few_lines_of_numpy_read_a_field(run: RunDirectory, grid: Grid) -> None:
+    """The lines printed in docs/output.md; fails when the block layout is not the one described there."""
+    content = (run.path / run.steps[1][1]).read_bytes()
+    head, data = content.split(b'<AppendedData encoding="raw">\n_')
+    offset = int(head.split(b'Name="C_TMA"')[1].split(b'offset="')[1].split(b'"')[0])
+    size = int(np.frombuffer(data, "<u8", 4, offset)[3])
+    values = np.frombuffer(zlib.decompress(data[offset + 32 : offset + 32 + size]), "<f8")
+    assert np.array_equal(values, fields(grid, TIMES[1])["C_TMA"])
+
+
+def test_own_reader_returns_what_was_written(run: RunDirectory, grid: Grid) -> None:
+    """Fails when read_vtu and encode_vtu disagree, or when single precision loses more than it must."""
+    snapshot = run.read_fields()
+    assert snapshot.time == TIMES[-1]
+    assert np.allclose(snapshot.centres[:, 1], centres(grid)[1] - 2e-3 * TIMES[-1], atol=1e-15)
+    assert set(snapshot.cell_data) == {"zone", "layer", "C_TMA", "velocity"}
+    single = RunDirectory(run.path)
+    single.write_fields(1.0, grid, fields(grid, 1.0))
+    stored = single.read_fields().cell_data["C_TMA"]
+    assert stored.dtype == np.float32
+    assert np.allclose(stored, fields(grid, 1.0)["C_TMA"], rtol=6e-8, atol=0)
+
+
+def test_wrong_shape_is_refused(run: RunDirectory, grid: Grid) -> None:
+    """Fails when an array of another length is written as if it were a field."""
+    with pytest.raises(MpmError, match="C_TMA: shape"):
+        run.write_fields(1.0, grid, {"C_TMA": np.zeros(grid.cells - 1)})
+    assert len(read_pvd(run.pvd)) == len(TIMES)
+
+
+def test_cut_back_then_continue(run: RunDirectory, grid: Grid) -> None:
+    """A resumed run ends with the same files as one that was never stopped; fails when a step is lost, doubled or stale."""
+    (run.path / "fields" / "fields_000007.vtu.tmp").write_text("half a file")
+    (run.path / "fields" / "fields_000009.vtu").write_text("written, but not listed yet")
+    again = RunDirectory(run.path, precision="Float64")
+    again.prepare(resume=True)
+    again.cut_back(TIMES[1])
+    assert [t for t, _ in read_pvd(run.pvd)] == TIMES[:2]
+    assert list(again.history()["time"]) == TIMES[:2]
+    write_run(again, grid, TIMES[2:])
+    assert [t for t, _ in read_pvd(run.pvd)] == TIMES
+    assert sorted(p.name for p in (run.path / "fields").iterdir()) == [
+        f"fields_{i:06d}.vtu" for i in range(4)
+    ]
+    for t, path in read_pvd(run.pvd):
+        assert np.array_equal(read_vtu(path).cell_data["C_TMA"], fields(grid, t)["C_TMA"])
+    assert list(RunDirectory(run.path).history()["time"]) == TIMES
+
+
+def test_history_keeps_every_digit_and_grows_columns(tmp_path: Path) -> None:
+    """Fails when a number changes on the way to disk, a late column loses its place, or an absent number becomes 0."""
+    directory = RunDirectory(tmp_path)
+    directory.append_history({"balance.TMA": 0.1 + 0.2, "time": 0.0, "cvd.rate_mean": None})
+    directory.append_history({"time": 1 / 3, "balance.TMA": 1e-300, "titration.tma.exit_mean": 0.5})
+    lines = (tmp_path / "history.csv").read_text().splitlines()
+    assert lines == [
+        "time,balance.TMA,titration.tma.exit_mean",
+        "0.0,0.30000000000000004,",
+        "0.3333333333333333,1e-300,0.5",
+    ]
+    history = RunDirectory(tmp_path).history()
+    assert history["time"][1] == 1 / 3 and np.isnan(history["titration.tma.exit_mean"][0])
+    with pytest.raises(MpmError, match=r"balance\.TMA is nan"):
+        directory.append_history({"time": 1.0, "balance.TMA": float("nan")})
+    assert (tmp_path / "history.csv").read_text().splitlines() == lines
+
+
+def test_summary_holds_finite_numbers_only(tmp_path: Path) -> None:
+    """Fails when NaN or infinity reaches the file, None is kept, or a numpy number is not written as a number."""
+    directory = RunDirectory(tmp_path)
+    summary = {
+        "cells": np.int64(5),
+        "a": {"x": np.float64(0.1), "gone": None},
+        "profile": np.array([0.5, 1.0]),
+        "ok": True,
+    }
+    directory.write_summary(summary)
+    expected = {"cells": 5, "a": {"x": 0.1}, "profile": [0.5, 1.0], "ok": True}
+    assert json.loads((tmp_path / "summary.json").read_text()) == expected == directory.read_summary()
+    for bad in (float("nan"), np.float64("inf"), np.array([1.0, -np.inf])):
+        with pytest.raises(MpmError, match=r"species: TMA.* is -?(nan|inf)"):
+            directory.write_summary({"species": {"TMA": bad}})
+    with pytest.raises(MpmError, match="set is not"):
+        directory.write_summary({"a": {1, 2}})
+    assert directory.read_summary() == expected
+
+
+def test_checkpoint_round_trip_is_exact(tmp_path: Path) -> None:
+    """Fails when a bit of an array or of the time is lost, or when a damaged file is taken for a state."""
+    directory = RunDirectory(tmp_path)
+    assert directory.read_checkpoint() is None
+    theta = np.random.default_rng(1).random((3, 7))
+    directory.write_checkpoint({"theta": theta, "phase": np.int64(3)}, {"time": 0.1 + 0.2, "case": "abc"})
+    stored = RunDirectory(tmp_path).read_checkpoint()
+    assert stored is not None
+    arrays, meta = stored
+    assert (
+        np.array_equal(arrays["theta"], theta) and arrays["phase"] == 3 and set(arrays) == {"theta", "phase"}
+    )
+    assert meta == {"time": 0.1 + 0.2, "case": "abc"}
+    (tmp_path / "checkpoint.npz").write_bytes(b"not a zip file")
+    with pytest.raises(InputError, match="not a checkpoint"):
+        directory.read_checkpoint()
+
+
+def test_directory_in_use_is_refused_or_emptied(run: RunDirectory, tmp_path: Path) -> None:
+    """Fails when an earlier run is overwritten without being asked to, or a file that is not ours is deleted."""
+    (run.path / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="--resume"):
+        RunDirectory(run.path).prepare()
+    assert len(run.steps) == len(TIMES)
+    RunDirectory(run.path).prepare(overwrite=True)
+    assert [p for p in run.path.rglob("*") if p.is_file()] == [run.path / "notes.txt"]
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be used"):
+        RunDirectory(tmp_path / "file").prepare()
+
+
+WRITER = """
+import sys
+import numpy as np
+from mpm.geometry import Grid
+from mpm.output import RunDirectory
+grid = Grid(np.linspace(0, 1, 101), np.linspace(0, 1, 51), np.zeros(50, int), np.ones(100, int), ("bed",), True)
+directory = RunDirectory(sys.argv[1])
+directory.prepare()
+print("writing", flush=True)
+for step in range(100000):
+    value = np.full(grid.cells, float(step))
+    directory.write_fields(float(step), grid, {"C_TMA": value + np.arange(grid.cells) % 7})
+    directory.append_history({"time": float(step), "balance.TMA": float(step)})
+    directory.write_checkpoint({"theta": value}, {"time": float(step)})
+"""
+
+
+@pytest.mark.parametrize("attempt", range(6))
+def test_killed_writer_leaves_readable_files(tmp_path: Path, attempt: int) -> None:
+    """SIGKILL at a random moment: fails when a listed step, the history or the checkpoint is damaged or out of step."""
+    target = tmp_path / "run"
+    process = subprocess.Popen([sys.executable, "-c", WRITER, str(target)], stdout=subprocess.PIPE)
+    assert process.stdout is not None and process.stdout.readline()
+    while not (target / "checkpoint.npz").exists():
+        time.sleep(1e-3)
+    time.sleep(random.Random(attempt).uniform(0.0, 0.3))
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    directory = RunDirectory(target)
+    steps = read_pvd(directory.pvd)
+    assert steps
+    for index, (t, path) in enumerate(steps):
+        assert t == index and read_vtu(path).cell_data["C_TMA"].min() == index
+    assert abs(len(directory.history()["time"]) - len(steps)) <= 1
+    stored = directory.read_checkpoint()
+    assert stored is not None
+    restart = stored[1]["time"]
+    assert np.all(stored[0]["theta"] == restart)
+    directory.cut_back(restart)
+    assert (
+        list(directory.history()["time"]) == [t for t, _ in directory.steps] == list(np.arange(restart + 1))
+    )
+    assert not list(target.rglob("*.tmp"))
+
+
+def test_write_atomically_leaves_the_old_file_when_it_fails(tmp_path: Path) -> None:
+    """Fails when a write that breaks off half way has already touched the file."""
+    path = tmp_path / "a.txt"
+    write_atomically(path, "old")
+    with pytest.raises(UnicodeEncodeError):
+        write_atomically(path, "new \ud800")
+    assert path.read_text() == "old"
