@@ -1,0 +1,27 @@
+"""The one place that loads the finite-element stack.
+
+The PyPI wheel `dolfinx-solver-real` must be imported as `dolfinx_solver` before dolfinx, petsc4py or slepc4py; conda-forge's
+`fenics-dolfinx` has no such module. Every module that needs dolfinx or petsc4py imports this one first.
+"""
+
+from __future__ import annotations
+
+from mpm.errors import MpmError
+
+try:
+    import dolfinx_solver  # noqa: F401
+except ModuleNotFoundError:
+    pass
+
+try:
+    import dolfinx
+    from petsc4py import PETSc
+except ModuleNotFoundError as missing:
+    raise MpmError(
+        f"the solver needs {missing.name}: install mpm[fem] from PyPI, or fenics-dolfinx from conda-forge"
+    ) from missing
+
+if PETSc.ScalarType is not PETSc.RealType:
+    raise MpmError("this PETSc is built for complex numbers; mpm needs the real one (dolfinx-solver-real)")
+
+__all__ = ["PETSc", "dolfinx"]

@@ -1,0 +1,371 @@
+"""Gas flow: Darcy-Brinkman with convection in the frame of the vibrating reactor.
+
+    div u = 0
+    (rho/eps) du/dt + (rho/eps^2) u.grad u = -grad p + div(mu_e grad u) - (mu/K) (u - eps v_s) - rho a(t)
+
+`u` is the superficial gas velocity relative to the mesh [m/s], `v_s` the bed's velocity relative to the mesh and `a` the mesh's
+acceleration; gravity and the vertical acceleration are gradients and vanish into the pressure `p` [Pa]. Gas layers have eps = 1 and
+1/K = 0. Walls are no-slip, ports prescribe the normal velocity, outlets have p = 0 and no tangential velocity gradient.
+
+Discretisation: Raviart-Thomas of lowest order on quadrilaterals with piecewise constant pressure. The flux through every facet is one
+unknown and div u vanishes exactly in every cell: the marker-and-cell scheme, written as forms. Convection is explicit, so one factor
+serves all steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import basix.ufl
+import numpy as np
+import ufl
+from numpy.typing import NDArray
+from ufl import Form, avg, conditional, div, dot, dS, ds, dx, grad, inner, jump, lt
+
+from mpm.fem import PETSc, dolfinx
+from mpm.motion import StepMotion
+from mpm.parallel import largest, total
+from mpm.solvers import DirectSolver
+from mpm.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
+
+if TYPE_CHECKING:
+    from mpm.case import Case
+
+Floats = NDArray[np.float64]
+CLOSED, OPEN = 1, 2  # facet markers: walls and inlets, outlets
+
+
+@dataclass(frozen=True)
+class Medium:
+    """What the gas flows through, as cell functions: density and viscosity are those of the carrier [SI].
+
+    `porosity` eps, `viscosity` mu_e, `resistance_x`, `resistance_y` mu/K [Pa s/m2], `entrainment` eps mu/K_x in the moving layers
+    and 0 elsewhere, `width`, `height` of the cells [m].
+    """
+
+    density: float
+    porosity: dolfinx.fem.Function
+    viscosity: dolfinx.fem.Function
+    resistance_x: dolfinx.fem.Function
+    resistance_y: dolfinx.fem.Function
+    entrainment: dolfinx.fem.Function
+    width: float
+    height: dolfinx.fem.Function
+
+    @classmethod
+    def from_case(cls, case: Case, strip: Strip) -> Medium:
+        mu = case.gas.viscosity
+        layers = [case.geometry.layers[i] for i in strip.grid.row_layer]
+        solids = [layer.material for layer in layers]
+
+        def rows(name: str, values: list[float]) -> dolfinx.fem.Function:
+            return strip.cell_function(np.asarray(values), name)
+
+        return cls(
+            density=case.gas.density,
+            porosity=rows("porosity", [s.porosity if s else 1.0 for s in solids]),
+            viscosity=rows("viscosity", [mu * s.viscosity_ratio if s else mu for s in solids]),
+            resistance_x=rows("resistance_x", [mu / s.permeability[0] if s else 0.0 for s in solids]),
+            resistance_y=rows("resistance_y", [mu / s.permeability[1] if s else 0.0 for s in solids]),
+            entrainment=rows(
+                "entrainment",
+                [s.porosity * mu / s.permeability[0] if s and l.moving else 0.0 for s, l in zip(solids, layers, strict=True)],
+            ),
+            width=strip.grid.dx,
+            height=rows("height", list(strip.grid.dy)),
+        )
+
+
+# --- the physical effects, one function each; every one is a term of the left-hand side unless it says otherwise ---
+
+
+def inertia(u, v, m: Medium) -> Form:
+    """(rho/eps) u . v, to be divided by the time step."""
+    return (m.density / m.porosity) * inner(u, v) * dx
+
+
+def convection(u, v, m: Medium) -> Form:
+    """(rho/eps^2) u.grad u, central in the jumps between cells; gas that comes in through a port or outlet carries no tangential
+    velocity. Central differences are safe while u h/nu < 2, which `mpm check` reports."""
+    n = ufl.FacetNormal(ufl.domain.extract_unique_domain(v))
+    c = m.density / m.porosity**2
+    un = dot(u, n)
+    incoming = conditional(lt(un, 0), un, 0)
+    tangential = u - un * n
+    degree = {"quadrature_degree": 2}
+    return (
+        inner(c * dot(grad(u), u), v) * dx(metadata=degree)
+        - dot(u("+"), n("+")) * inner(jump(u), avg(c * v)) * dS(metadata=degree)
+        - c * incoming * inner(tangential, v) * ds(metadata=degree)
+    )
+
+
+def viscosity(u, v, m: Medium, closed: ufl.Measure) -> Form:
+    """-div(mu_e grad u): normal derivatives in the cells, tangential ones as differences between neighbouring cells and to walls.
+
+    For the lowest order these differences are consistent as they stand; a penalty factor would multiply the viscosity.
+    """
+    n = ufl.FacetNormal(ufl.domain.extract_unique_domain(v))
+    half = (m.width * n[0] ** 2 + m.height * n[1] ** 2) / (2 * m.viscosity)
+    wall_u, wall_v = u - dot(u, n) * n, v - dot(v, n) * n
+    return (
+        m.viscosity * inner(grad(u), grad(v)) * dx
+        + inner(jump(u), jump(v)) / (half("+") + half("-")) * dS
+        + inner(wall_u, wall_v) / half * closed
+    )
+
+
+def drag(u, v, m: Medium) -> Form:
+    """(mu/K) u, per direction."""
+    return (m.resistance_x * u[0] * v[0] + m.resistance_y * u[1] * v[1]) * dx
+
+
+def pressure_and_continuity(u, p, v, q) -> Form:
+    """grad p (integrated by parts, p = 0 at outlets) and -div u = 0, symmetric."""
+    return -(p * div(v) + q * div(u)) * dx
+
+
+def bed_entrainment(v, m: Medium) -> Form:
+    """Right-hand side per unit bed velocity: (mu/K) eps v_s."""
+    return m.entrainment * v[0] * dx
+
+
+def frame_acceleration(v, m: Medium) -> Form:
+    """Right-hand side per unit acceleration of the frame: -rho a_x."""
+    return -m.density * v[0] * dx
+
+
+@dataclass(frozen=True, eq=False)
+class FaceFlow:
+    """Velocities normal to faces, positive along the axes [m/s]: `inner` in the order of `strip.faces`, `bottom` and `top` in that of
+    `strip.wall_cells`."""
+
+    inner: Floats
+    bottom: Floats
+    top: Floats
+
+
+class FlowProblem:
+    """Assembled flow operators of a case; advances or balances the mixed vector (u, p).
+
+    One factor belongs to the time step `dt` [s] (backward Euler), one to the steady operator; each is made when first needed.
+    """
+
+    def __init__(self, case: Case, strip: Strip, dt: float):
+        self.case, self.strip, self.dt = case, strip, float(dt)
+        mesh = strip.mesh
+        element = basix.ufl.mixed_element(
+            [basix.ufl.element("RTCF", "quadrilateral", 1), basix.ufl.element("DQ", "quadrilateral", 0)]
+        )
+        self.space = dolfinx.fem.functionspace(mesh, element)
+        self.medium = Medium.from_case(case, strip)
+        self.state = dolfinx.fem.Function(self.space, name="flow")
+        self._weights = self._facet_weights()
+        self.inflow, self.frame_inflow = self._port_values()
+        self._assemble()
+        self._solvers: dict[str, DirectSolver] = {}
+
+    # --- set-up ---
+
+    def _facet_weights(self) -> Floats:
+        """Unknown of a facet per unit velocity along the axes (its length, with the sign of the element's orientation)."""
+        velocity_space, to_mixed = self.space.sub(0).collapse()
+        ones = dolfinx.fem.Function(velocity_space)
+        ones.interpolate(lambda x: np.ones((2, x.shape[1])))
+        weights = np.ones(len(self.state.x.array))
+        weights[to_mixed] = ones.x.array
+        dofs = self.space.dofmap.list
+        self._facet_dofs, self._pressure_dofs = dofs[:, :4], dofs[:, 4]
+        return weights
+
+    def _port_values(self) -> tuple[Floats, Floats]:
+        """Prescribed normal velocities (as unknowns): of the inlets at rest, and per unit vertical velocity of the frame.
+
+        Inlets that stay in the lab's frame see the mesh move past: their velocity relative to it is v - V_y.
+        """
+        steady, per_frame = np.zeros(len(self._weights)), np.zeros(len(self._weights))
+        lab = self.case.motion.inlet_frame == "lab"
+        for inlet in self.case.geometry.inlets:
+            cells = self.strip.wall_cells(inlet.side)
+            bottom = inlet.side == "bottom"
+            share = self.strip.grid.overlap(inlet)[self.strip.column[cells]] / self.strip.grid.dx
+            dofs = self._facet_dofs[cells, BOTTOM if bottom else TOP]
+            steady[dofs] += self._weights[dofs] * share * inlet.velocity * (1.0 if bottom else -1.0)
+            if lab:
+                per_frame[dofs] -= self._weights[dofs] * share
+        return steady, per_frame
+
+    def _markers(self) -> tuple[dolfinx.mesh.MeshTags, NDArray[np.int32]]:
+        """Facets marked closed or open, and the unknowns that are prescribed."""
+        strip, open_facets = self.strip, []
+        for outlet in self.case.geometry.outlets:
+            cells = strip.wall_cells(outlet.side)
+            opening = strip.grid.opening(outlet)[strip.column[cells]]
+            open_facets.append(strip.wall_facets(outlet.side)[opening])
+        opened = np.concatenate(open_facets) if open_facets else np.empty(0, np.int64)
+        boundary = np.concatenate([strip.wall_facets("bottom"), strip.wall_facets("top"), strip.end_facets()])
+        closed = np.setdiff1d(boundary, opened)
+        facets = np.concatenate([closed, opened])
+        values = np.concatenate([np.full(len(closed), CLOSED), np.full(len(opened), OPEN)])
+        order = np.argsort(facets)
+        tags = dolfinx.mesh.meshtags(strip.mesh, 1, facets[order].astype(np.int32), values[order].astype(np.int32))
+        is_closed = np.zeros(int(strip.facets.max(initial=-1)) + 1, dtype=bool)
+        is_closed[closed] = True
+        own = strip.facets[: strip.owned]
+        dofs = np.unique(self._facet_dofs[: strip.owned][is_closed[own]])
+        return tags, dofs.astype(np.int32)
+
+    def _assemble(self) -> None:
+        (u, p), (v, q) = ufl.TrialFunctions(self.space), ufl.TestFunctions(self.space)
+        m = self.medium
+        tags, self._fixed = self._markers()
+        closed = ufl.Measure("ds", domain=self.strip.mesh, subdomain_data=tags)(CLOSED)
+        stokes = viscosity(u, v, m, closed) + drag(u, v, m) + pressure_and_continuity(u, p, v, q)
+        if not self.case.geometry.outlets:  # the pressure's level is free: let cell 0 leak p, which pins it at 0 there
+            level = dolfinx.fem.Function(m.porosity.function_space)
+            first = np.flatnonzero(self.strip.cell == 0)
+            level.x.array[level.function_space.dofmap.list[first, 0]] = 1.0
+            stokes += -level * p * q * dx
+        self.steady_matrix = _matrix(stokes)
+        self.mass_matrix = _matrix(inertia(u, v, m) + dolfinx.fem.Constant(self.strip.mesh, 0.0) * p * q * dx)
+        self.entrainment = _vector(bed_entrainment(v, m))
+        self.acceleration = _vector(frame_acceleration(v, m))
+        velocity, _ = ufl.split(self.state)
+        self._convection_form = convection(velocity, v, m)
+        self._convection = dolfinx.fem.form(self._convection_form)
+        self._jacobian_form = stokes + ufl.derivative(self._convection_form, self.state)
+        # a function's own vector, so that ghost values are at hand after a solve
+        self.vector = self.state.x.petsc_vec
+        self._rhs, self._work, self._fix = (self.steady_matrix.createVecLeft() for _ in range(3))
+        own = self.space.dofmap.index_map.size_local
+        self._own = own
+        self._own_fixed = self._fixed[self._fixed < own]
+
+    def _solver(self, kind: str) -> DirectSolver:
+        if kind not in self._solvers:
+            matrix = self.steady_matrix.copy()
+            if kind == "step":
+                matrix.axpy(1.0 / self.dt, self.mass_matrix, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
+            self._solvers[kind] = DirectSolver(matrix, f"flow ({kind})")
+        return self._solvers[kind]
+
+    # --- solving ---
+
+    def ports(self, frame_velocity_y: float) -> Floats:
+        """Prescribed values of the inlet unknowns while the frame moves upwards at `frame_velocity_y` [m/s]."""
+        return self.inflow + frame_velocity_y * self.frame_inflow
+
+    def convective_force(self) -> PETSc.Vec:
+        """N(u) of the present state as an assembled vector; a new vector."""
+        force = self._rhs.duplicate()
+        force.set(0.0)
+        with force.localForm() as local:
+            local.set(0.0)
+        dolfinx.fem.petsc.assemble_vector(force, self._convection)
+        force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return force
+
+    def step(self, motion: StepMotion, convective: PETSc.Vec | None = None) -> None:
+        """Advance the state by one backward Euler step under the step's mean forcing; convection is taken at the old state."""
+        convective = convective if convective is not None else self.convective_force()
+        self.mass_matrix.mult(self.vector, self._rhs)
+        self._rhs.scale(1.0 / self.dt)
+        self._balance("step", motion, convective)
+
+    def settle(self, motion: StepMotion, convective: PETSc.Vec) -> None:
+        """Set the state to the steady solution under `motion` with a given convective force."""
+        self._rhs.set(0.0)
+        self._balance("steady", motion, convective)
+
+    def _balance(self, kind: str, motion: StepMotion, convective: PETSc.Vec) -> None:
+        solver = self._solver(kind)
+        rhs = self._rhs
+        rhs.axpy(motion.bed_velocity, self.entrainment)
+        rhs.axpy(motion.acceleration, self.acceleration)
+        rhs.axpy(-1.0, convective)
+        self._prescribe(rhs, kind, motion.frame_velocity_y)
+        solver.solve(rhs, self._work)
+        self._adopt(self._work)
+
+    def _prescribe(self, rhs: PETSc.Vec, kind: str, frame_velocity_y: float) -> None:
+        """Move the prescribed unknowns to the right-hand side."""
+        values = self.ports(frame_velocity_y)[: self._own][self._own_fixed]
+        self._fix.set(0.0)
+        self._fix.array[self._own_fixed] = values
+        lifted = rhs.duplicate()
+        self.steady_matrix.mult(self._fix, lifted)
+        rhs.axpy(-1.0, lifted)
+        if kind == "step":
+            self.mass_matrix.mult(self._fix, lifted)
+            rhs.axpy(-1.0 / self.dt, lifted)
+        lifted.destroy()
+        rhs.array[self._own_fixed] = values
+
+    def _adopt(self, values: PETSc.Vec) -> None:
+        self.state.x.array[: self._own] = values.array
+        self.state.x.scatter_forward()
+
+    # --- looking at the state ---
+
+    def velocities(self) -> Floats:
+        """Velocities along the axes at the bottom, left, right and top facet of every local cell, (4, cells) [m/s]."""
+        dofs = self._facet_dofs
+        return np.ascontiguousarray((self.state.x.array[dofs] / self._weights[dofs]).T)
+
+    def pressure(self) -> Floats:
+        """Pressure in every local cell [Pa]."""
+        return self.state.x.array[self._pressure_dofs]
+
+    def set_state(self, velocities: Floats, pressure: Floats) -> None:
+        """Inverse of `velocities` and `pressure`."""
+        dofs = self._facet_dofs
+        self.state.x.array[dofs] = velocities.T * self._weights[dofs]
+        self.state.x.array[self._pressure_dofs] = pressure
+
+    def divergence(self) -> float:
+        """Largest |div u| of any cell, as the net flux out of it over the whole inflow (or the largest face flux without one)."""
+        u = self.velocities()[:, : self.strip.owned]
+        height, dx = self.strip.height[: self.strip.owned], self.strip.grid.dx
+        net = (u[RIGHT] - u[LEFT]) * height + (u[TOP] - u[BOTTOM]) * dx
+        flux = np.abs(np.concatenate([u[RIGHT] * height, u[TOP] * dx])).max(initial=0.0)
+        worst, scale = largest(self.strip.comm, [np.abs(net).max(initial=0.0), flux])
+        inflow = sum(abs(i.velocity) * i.width for i in self.case.geometry.inlets) or scale
+        return float(worst / inflow) if inflow else 0.0
+
+
+def face_flow(strip: Strip, velocities: Floats) -> FaceFlow:
+    """Face velocities of `velocities` (4, cells) as the transport needs them."""
+    faces = strip.faces
+    sides = np.where(faces.vertical_flow, TOP, RIGHT)
+    bottom, top = strip.wall_cells("bottom"), strip.wall_cells("top")
+    return FaceFlow(velocities[sides, faces.behind], velocities[BOTTOM, bottom], velocities[TOP, top])
+
+
+def boundary_flows(case: Case, strip: Strip, flow: FaceFlow) -> dict[str, float]:
+    """Volume flow through each port, positive into the strip [m2/s per metre of depth... m3/s/m]."""
+    walls = {"bottom": flow.bottom, "top": -flow.top}
+    grid = strip.grid
+    flows = {}
+    for inlet in case.geometry.inlets:
+        columns = strip.column[strip.wall_cells(inlet.side)]
+        share = grid.overlap(inlet)[columns] > 0.0
+        flows[inlet.name] = float(np.sum(walls[inlet.side][share]) * grid.dx)
+    for outlet in case.geometry.outlets:
+        columns = strip.column[strip.wall_cells(outlet.side)]
+        flows[outlet.name] = float(np.sum(walls[outlet.side][grid.opening(outlet)[columns]]) * grid.dx)
+    values = total(strip.comm, list(flows.values()))
+    return dict(zip(flows, map(float, values), strict=True))
+
+
+def _matrix(form: Form) -> PETSc.Mat:
+    matrix = dolfinx.fem.petsc.assemble_matrix(dolfinx.fem.form(form))
+    matrix.assemble()
+    return matrix
+
+
+def _vector(form: Form) -> PETSc.Vec:
+    vector = dolfinx.fem.petsc.assemble_vector(dolfinx.fem.form(form))
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return vector

@@ -1,0 +1,223 @@
+"""How the reactor and the bed move: vibration, the bed's piecewise velocity, and their integrals over time steps.
+
+The mesh rides rigidly on the reactor, displaced by X(t) = (A_x, A_y) sin(w t) with A_y = Gamma g / w^2; `t` counts from the start of
+the vibration. Solids move with the reactor in contact and at constant velocity in flight. Everything that drives the gas or the bed
+is given as a mean over a time step, so that sums over a cycle are exact whatever the number of steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from mpm.errors import InputError
+
+if TYPE_CHECKING:
+    from mpm.case import Motion
+
+Floats = NDArray[np.float64]
+GRAVITY = 9.81  # m/s2, the value behind the seed's printed velocities
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """Sinusoidal displacement of the reactor: amplitudes `ax`, `ay` [m], angular frequency `omega` [1/s]."""
+
+    ax: float
+    ay: float
+    omega: float
+
+    @classmethod
+    def from_motion(cls, motion: Motion) -> Vibration:
+        """A_y = Gamma g / w^2; the angle is counted from the horizontal or from the vertical."""
+        omega = TURN * motion.frequency
+        ay = motion.gamma * GRAVITY / omega**2
+        slope = np.tan(motion.angle)
+        return cls(float(ay / slope if motion.angle_from == "horizontal" else ay * slope), float(ay), float(omega))
+
+    @property
+    def period(self) -> float:
+        return TURN / self.omega
+
+    def displacement(self, t: float) -> tuple[float, float]:
+        """X(t) [m]."""
+        s = float(np.sin(self.omega * t))
+        return self.ax * s, self.ay * s
+
+    def velocity(self, t: float) -> tuple[float, float]:
+        """dX/dt [m/s]."""
+        c = float(self.omega * np.cos(self.omega * t))
+        return self.ax * c, self.ay * c
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Bed in contact from `contact` to `liftoff` (phases in [0, 2 pi)) and else flying at horizontal velocity `velocity` [m/s]."""
+
+    liftoff: float
+    contact: float
+    velocity: float
+
+
+def thesis_phases(vibration: Vibration, liftoff_velocity: float) -> tuple[float, float]:
+    """Lift-off and contact phase [rad] of the seed's piecewise profile.
+
+    Lift-off is where the reactor's falling vertical velocity reaches `liftoff_velocity` [m/s, negative]; the bed keeps that
+    velocity until the reactor comes up to meet it. At base conditions 97.85 and 18.71 degrees.
+
+    Raises InputError when the reactor never moves that fast.
+    """
+    peak = vibration.ay * vibration.omega
+    if not -peak < liftoff_velocity < 0.0:
+        raise InputError(
+            f"motion.liftoff_velocity: found {liftoff_velocity:g} m/s; accepted: between {-peak:.4g} m/s (the reactor's peak) and 0 m/s"
+        )
+    liftoff = float(np.arccos(liftoff_velocity / peak))
+    slope = liftoff_velocity / peak
+
+    def gap(phase: float) -> float:
+        """Bed above reactor, over A_y."""
+        return np.sin(liftoff) + slope * (phase - liftoff) - np.sin(phase)
+
+    # the reactor turns upwards and overtakes the bed within one turn of lift-off: gap opens, then closes once
+    lowest = TURN - np.arccos(slope)  # reactor's upward-going instant of equal velocity: largest gap
+    contact = float(brentq(gap, lowest, liftoff + TURN, xtol=1e-14))
+    return liftoff, contact % TURN
+
+
+def flight_velocity(vibration: Vibration, liftoff: float, contact: float, mean: float) -> float:
+    """Horizontal velocity in flight [m/s] that makes the cycle mean equal to `mean`.
+
+    mean T = A_x (sin(liftoff) - sin(contact)) + u T_flight.
+    """
+    flight_time = ((contact - liftoff) % TURN) / vibration.omega
+    carried = vibration.ax * (np.sin(liftoff) - np.sin(contact))
+    return float((mean * vibration.period - carried) / flight_time)
+
+
+class BedMotion:
+    """Position of the bed relative to the reactor (the mesh), s(t) [m], from the start of the vibration.
+
+    `mean` [m/s] is the mean conveying velocity. `at(t)` gives s(t) exactly; v_s averaged over a step is (s(t1) - s(t0)) / (t1 - t0).
+    """
+
+    def __init__(self, motion: Motion):
+        self.vibration = Vibration.from_motion(motion)
+        self.start = motion.start
+        self.flight: Flight | None = None
+        self._table: tuple[Floats, Floats, Floats] | None = None
+        self.mean = 0.0
+        if motion.gamma == 0.0:
+            self.mean = motion.bed_velocity
+        elif motion.profile in ("thesis", "phases"):
+            self.mean = motion.bed_velocity
+            if motion.profile == "thesis":
+                liftoff, contact = thesis_phases(self.vibration, motion.liftoff_velocity)
+            else:
+                liftoff, contact = motion.liftoff_phase, motion.contact_phase
+            self.flight = Flight(liftoff, contact, flight_velocity(self.vibration, liftoff, contact, self.mean))
+        else:
+            phase, velocity = read_profile(Path(motion.profile))
+            distance = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(phase) * (velocity[1:] + velocity[:-1]))])
+            self._table = (phase, velocity, distance / self.vibration.omega)
+            self.mean = float(distance[-1] / TURN)
+
+    @property
+    def moving(self) -> bool:
+        """False when the bed never leaves the reactor's frame."""
+        return self.vibration.ax != 0.0 and (self.flight is not None or self._table is not None) or self.mean != 0.0
+
+    def at(self, t: float) -> float:
+        """Distance the bed has slid relative to the reactor since the vibration started, s(t) with s(0) = 0 [m]."""
+        if t <= 0.0:
+            return 0.0
+        if self.flight is None and self._table is None:
+            return self.mean * t
+        cycles, rest = divmod(self.vibration.omega * t, TURN)
+        lab = cycles * self.mean * self.vibration.period + self._lab_distance(rest)
+        return float(lab - self.vibration.ax * np.sin(self.vibration.omega * t))
+
+    def _lab_distance(self, phase: float) -> float:
+        """Distance travelled in the lab's frame from phase 0 to `phase` <= 2 pi."""
+        if self._table is not None:
+            phases, velocities, distances = self._table
+            i = min(int(np.searchsorted(phases, phase, side="right")) - 1, len(phases) - 2)
+            v = velocities[i] + (velocities[i + 1] - velocities[i]) * (phase - phases[i]) / (phases[i + 1] - phases[i])
+            return float(distances[i] + 0.5 * (velocities[i] + v) * (phase - phases[i]) / self.vibration.omega)
+        assert self.flight is not None
+        flight = self.flight
+        # walk through the intervals of one turn that starts at phase 0
+        edges = sorted({0.0, flight.liftoff, flight.contact, phase})
+        distance = 0.0
+        for a, b in zip(edges[:-1], edges[1:], strict=True):
+            if b > phase:
+                break
+            middle = 0.5 * (a + b)
+            flying = (middle - flight.liftoff) % TURN < (flight.contact - flight.liftoff) % TURN
+            if flying:
+                distance += flight.velocity * (b - a) / self.vibration.omega
+            else:
+                distance += self.vibration.ax * (np.sin(b) - np.sin(a))
+        return float(distance)
+
+    def lab_velocity(self, t: float) -> float:
+        """Horizontal velocity of the bed in the lab's frame at time `t` of the vibration [m/s]."""
+        phase = (self.vibration.omega * t) % TURN
+        if self._table is not None:
+            return float(np.interp(phase, self._table[0], self._table[1]))
+        if self.flight is None:
+            return self.mean + self.vibration.velocity(t)[0]
+        flying = (phase - self.flight.liftoff) % TURN < (self.flight.contact - self.flight.liftoff) % TURN
+        return self.flight.velocity if flying else self.vibration.velocity(t)[0]
+
+
+@dataclass(frozen=True)
+class StepMotion:
+    """Means over one time step: bed velocity relative to the mesh, frame acceleration a_x, frame velocity V_y; slide = distance."""
+
+    bed_velocity: float
+    acceleration: float
+    frame_velocity_y: float
+    slide: float
+
+
+REST = StepMotion(0.0, 0.0, 0.0, 0.0)
+
+
+def step_motion(bed: BedMotion, t0: float, t1: float) -> StepMotion:
+    """Means over the step from `t0` to `t1` [s since the vibration started; not across the start]."""
+    if t1 <= 0.0:
+        return REST
+    dt = t1 - t0
+    vibration = bed.vibration
+    slide = bed.at(t1) - bed.at(t0)
+    return StepMotion(
+        slide / dt,
+        (vibration.velocity(t1)[0] - vibration.velocity(t0)[0]) / dt,
+        (vibration.displacement(t1)[1] - vibration.displacement(t0)[1]) / dt,
+        slide,
+    )
+
+
+def read_profile(path: Path) -> tuple[Floats, Floats]:
+    """Phase [rad, from 0 to 2 pi] and lab-frame bed velocity u_x [m/s] of a profile written by `mpm dem`.
+
+    The first point is repeated one turn later, so that linear interpolation closes the cycle.
+    """
+    table = np.genfromtxt(path, delimiter=",", names=True, comments="#", deletechars="", replace_space="_")
+    phase = np.radians(np.atleast_1d(table["phase_deg"]))
+    velocity = np.atleast_1d(table["u_x_m/s"])
+    inside = (phase >= 0.0) & (phase < TURN * (1.0 - 1e-12))
+    phase, velocity = phase[inside], velocity[inside]
+    order = np.argsort(phase)
+    phase, velocity = phase[order], velocity[order]
+    at_zero = float(np.interp(0.0, [phase[-1] - TURN, phase[0]], [velocity[-1], velocity[0]]))
+    if phase[0] > 0.0:
+        phase, velocity = np.insert(phase, 0, 0.0), np.insert(velocity, 0, at_zero)
+    return np.append(phase, TURN), np.append(velocity, velocity[0])

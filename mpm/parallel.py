@@ -1,0 +1,94 @@
+"""Reductions and gathers over the ranks: the only module that talks to other ranks by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from mpm.errors import MpmError
+
+Floats = NDArray[np.float64]
+
+
+def is_root(comm: MPI.Comm) -> bool:
+    return bool(comm.rank == 0)
+
+
+def total(comm: MPI.Comm, values: ArrayLike) -> Floats:
+    """Sum over ranks, elementwise; every rank gets the result."""
+    local = np.ascontiguousarray(values, dtype=np.float64)
+    result = np.empty_like(local)
+    comm.Allreduce(local, result, op=MPI.SUM)
+    return result
+
+
+def largest(comm: MPI.Comm, values: ArrayLike) -> Floats:
+    """Maximum over ranks, elementwise; every rank gets the result."""
+    local = np.ascontiguousarray(values, dtype=np.float64)
+    result = np.empty_like(local)
+    comm.Allreduce(local, result, op=MPI.MAX)
+    return result
+
+
+def any_rank(comm: MPI.Comm, flag: bool) -> bool:
+    """True on every rank as soon as it is true on one."""
+    return bool(comm.allreduce(bool(flag), op=MPI.LOR))
+
+
+def on_root[T](comm: MPI.Comm, action: Callable[[], T]) -> T:
+    """Run `action` on rank 0 and give its result, or its error, to every rank."""
+    outcome: tuple[bool, Any] = (True, None)
+    if is_root(comm):
+        try:
+            outcome = (True, action())
+        except (MpmError, OSError) as error:
+            outcome = (False, error)
+    good, value = comm.bcast(outcome, root=0)
+    if not good:
+        raise value
+    return value
+
+
+class Scatter:
+    """Moves cell values between their owners and one array in the grid's order.
+
+    `places` are the positions, in the global array of length `size`, of this rank's values. Every position has one owner.
+    """
+
+    def __init__(self, comm: MPI.Comm, places: NDArray[np.integer], size: int):
+        self.comm, self.places, self.size = comm, np.asarray(places, dtype=np.int64), size
+        self.counts = np.asarray(comm.allgather(len(self.places)))
+        self.all_places = np.concatenate(comm.allgather(self.places)) if size else np.empty(0, np.int64)
+
+    def to_all(self, local: Floats) -> Floats:
+        """The global array on every rank; `local` has shape (..., n) with n own values."""
+        local = np.asarray(local, dtype=np.float64)
+        lead = local.shape[:-1]
+        width = int(np.prod(lead, dtype=np.int64))
+        send = np.ascontiguousarray(local.reshape(width, -1).T)
+        received = np.empty((self.size, width))
+        self.comm.Allgatherv(send, [received, self.counts * width])
+        return self._ordered(received, lead)
+
+    def to_root(self, local: Floats) -> Floats | None:
+        """The global array on rank 0, None elsewhere."""
+        local = np.asarray(local, dtype=np.float64)
+        lead = local.shape[:-1]
+        width = int(np.prod(lead, dtype=np.int64))
+        send = np.ascontiguousarray(local.reshape(width, -1).T)
+        received = np.empty((self.size, width)) if is_root(self.comm) else None
+        self.comm.Gatherv(send, None if received is None else [received, self.counts * width], root=0)
+        return None if received is None else self._ordered(received, lead)
+
+    def _ordered(self, received: Floats, lead: tuple[int, ...]) -> Floats:
+        ordered = np.empty_like(received)
+        ordered[self.all_places] = received
+        return np.ascontiguousarray(ordered.T).reshape(*lead, self.size)
+
+    def to_local(self, whole: Floats) -> Floats:
+        """This rank's values of a global array that every rank has, shape (..., size)."""
+        return np.ascontiguousarray(whole[..., self.places])
