@@ -1,0 +1,329 @@
+"""The powder file of `mpm dem` (TOML): one set of classes reads it, checks it and writes it back.
+
+Quantities carry units as everywhere in mpm; lengths of the box are pure numbers, counted in mean particle
+diameters. Reading needs no LAMMPS.
+"""
+
+import hashlib
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from mpm.errors import InputError
+from mpm.units import (
+    Angle,
+    Density,
+    Dimension,
+    Frequency,
+    Length,
+    MolarMass,
+    NonNegative,
+    Positive,
+    Pressure,
+    Speed,
+    Temperature,
+    Viscosity,
+    reject,
+)  # fmt: skip
+
+from .accelerometer import fit_record, read_record
+from .powder import POWDERS, Powder
+from .reading import one_line, set_dotted
+from .relations import GRAVITY, ideal_gas_density
+from .waveform import Harmonic, HarmonicWaveform, Sawtooth, Waveform, from_table, seed_table_2_2, sine
+
+Acceleration = Annotated[float, Dimension("m/s^2", "an acceleration", "10.581 m/s^2")]
+Stiffness = Annotated[float, Dimension("N/m", "a spring stiffness", "30 N/m", above=0.0)]
+Hamaker = Annotated[float, Dimension("J", "a Hamaker constant", "3.1e-20 J", at_least=0.0)]
+Spread = Annotated[float, Dimension("m", "a standard deviation", "13.9 um", at_least=0.0)]
+Tilt = Annotated[float, Dimension("rad", "an angle", "3 deg", at_least=-math.pi / 4, at_most=math.pi / 4)]
+Inclination = Annotated[float, Dimension("rad", "an angle", "60 deg", above=0.0, below=math.pi / 2)]
+Restitution = Annotated[float, Dimension("", "a coefficient of restitution", "0.97", above=0.0, at_most=1.0)]
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PowderInput(Section):
+    """A built-in powder by name (`powder = "GL56"`), or one described or overridden key by key."""
+
+    base: str | None = None
+    diameter: Length | None = None
+    deviation: Spread | None = None
+    density: Density | None = None
+    sphericity: Annotated[float, Dimension("", "a sphericity", "0.79", above=0.0, at_most=1.0)] | None = None
+    friction: NonNegative | None = None
+    wall_friction: NonNegative | None = None
+    restitution: Restitution | None = None
+    wall_restitution: Restitution | None = None
+    hamaker: Hamaker | None = None
+    wall_hamaker: Hamaker | None = None
+    asperity: Length | None = None
+    stiffness: Stiffness | None = None
+    ergun: tuple[Positive, Positive] | None = None
+
+    @field_validator("base")
+    @classmethod
+    def known(cls, value: str | None) -> str | None:
+        if value is not None and value not in POWDERS:
+            raise reject(repr(value), "one of " + ", ".join(POWDERS), given=value, known=list(POWDERS))
+        return value
+
+    @model_validator(mode="after")
+    def complete(self) -> "PowderInput":
+        if self.base is None:
+            for key in ("diameter", "density"):
+                if getattr(self, key) is None:
+                    raise reject("nothing", "this key, or base = one of " + ", ".join(POWDERS), key=key)
+        return self
+
+    def build(self) -> Powder:
+        given: dict[str, Any] = {k: v for k, v in self if k != "base" and v is not None}
+        if self.base is not None:
+            powder = POWDERS[self.base]
+            if not given:
+                return powder
+            # The fluidisation test was of the powder as it is, not of a changed one.
+            return replace(powder, name=f"{self.base} (changed)", measured_umf=None, **given)
+        defaults: dict[str, Any] = {"deviation": 0.0, "sphericity": 1.0, "source": "given in the powder file"}
+        return Powder(name="powder", **{**defaults, **given})
+
+
+class SineInput(Section):
+    """A pure sine of the vertical acceleration `gamma` g."""
+
+    kind: Literal["sine"]
+    gamma: Positive
+    frequency: Frequency
+    angle: Inclination = math.pi / 3
+    angle_from: Literal["horizontal", "vertical"] = "horizontal"
+
+    def build(self, directory: Path) -> Waveform:
+        return sine(self.gamma, self.frequency, self.angle, self.angle_from)
+
+
+class SawtoothInput(Section):
+    """The pseudo-sawtooth with the displacement of a sine of the vertical acceleration `gamma` g."""
+
+    kind: Literal["sawtooth"]
+    gamma: Positive
+    frequency: Frequency
+    angle: Inclination = math.pi / 4
+    angle_from: Literal["horizontal", "vertical"] = "horizontal"
+    extension_ratio: Annotated[float, Dimension("", "f_a/f_1", "0.6667", above=0.5, below=1.0)] = 2.0 / 3.0
+
+    def build(self, directory: Path) -> Waveform:
+        like = sine(self.gamma, self.frequency, self.angle, self.angle_from)
+        x, z = (
+            h[0].amplitude / (2.0 * math.pi * self.frequency) ** 2 for h in (like.horizontal, like.vertical)
+        )
+        return Sawtooth(x, z, self.frequency, self.extension_ratio)
+
+
+class SeedInput(Section):
+    """The seed's table 2.2: the first `harmonics` of each direction, scaled to the fundamental `gamma` g."""
+
+    kind: Literal["seed"]
+    harmonics: Annotated[int, Field(ge=1, le=3)] = 3
+    gamma: Positive | None = None
+
+    def build(self, directory: Path) -> Waveform:
+        full = seed_table_2_2()
+        cut = HarmonicWaveform(
+            full.horizontal[: self.harmonics], full.vertical[: self.harmonics], full.frequency
+        )
+        return cut if self.gamma is None else cut.scaled(self.gamma * GRAVITY / full.vertical[0].amplitude)
+
+
+class HarmonicInput(Section):
+    amplitude: Acceleration
+    frequency: Frequency
+    phase: Angle = -math.pi / 2
+
+
+class HarmonicsInput(Section):
+    """Lists of harmonics, `[[waveform.horizontal]]` and `[[waveform.vertical]]`; A cos(2 pi f t - phase)."""
+
+    kind: Literal["harmonics"]
+    frequency: Frequency
+    horizontal: tuple[HarmonicInput, ...]
+    vertical: tuple[HarmonicInput, ...]
+
+    def build(self, directory: Path) -> Waveform:
+        horizontal, vertical = (
+            tuple(Harmonic(h.amplitude, h.frequency, h.phase) for h in row)
+            for row in (self.horizontal, self.vertical)
+        )
+        return HarmonicWaveform(horizontal, vertical, self.frequency).aligned()
+
+
+class MeasuredInput(Section):
+    """Accelerations from a CSV file of t, a_x, a_z: one period (`table`) or a record to be fitted."""
+
+    kind: Literal["table", "accelerometer"]
+    file: str
+    harmonics: Annotated[int, Field(ge=1, le=64)] | None = None
+    unit: Literal["m/s^2", "g"] = "m/s^2"
+
+    def build(self, directory: Path) -> Waveform:
+        record = read_record(directory / self.file, self.unit)
+        if self.kind == "accelerometer":
+            return fit_record(record, self.harmonics or 3)[0]
+        return from_table(record.t, record.acceleration, harmonics=self.harmonics or 16)
+
+
+WaveformInput = Annotated[
+    SineInput | SawtoothInput | SeedInput | HarmonicsInput | MeasuredInput, Field(discriminator="kind")
+]
+
+
+class BoxInput(Section):
+    """The periodic box; length, depth and bed height in mean particle diameters."""
+
+    length: Annotated[float, Dimension("", "diameters", "8", at_least=3.0)] = 12.0
+    depth: Annotated[float, Dimension("", "diameters", "4", at_least=3.0)] = 5.0
+    height: Annotated[float, Dimension("", "diameters", "15", above=0.0)] = 15.0
+    stiffness: Stiffness = 30.0
+    size_classes: Annotated[int, Field(ge=1, le=20)] = 5
+    cohesion: bool = True
+    base: Literal["flat", "frit", "sawtooth"] = "flat"
+    frit_diameter: Length = 25e-6
+    baffle_height: Length = 2e-3
+    baffle_width: Length = 2e-3
+    declination: Tilt = 0.0
+    steps_per_collision: Annotated[float, Dimension("", "steps", "14", at_least=2.0)] = 14.0
+
+
+class GasInput(Section):
+    """Gas in the bed; `velocity` is the superficial aeration velocity relative to the base."""
+
+    velocity: Speed = 0.0
+    viscosity: Viscosity = 18e-6
+    molar_mass: MolarMass = 29e-3
+    temperature: Temperature = 293.15
+    pressure: Pressure = 101325.0
+
+    @property
+    def density(self) -> float:
+        return ideal_gas_density(self.molar_mass, self.temperature, self.pressure)
+
+
+class RunInput(Section):
+    """Cycles per seed (the first `discard` are not averaged), the seeds, and the sampling of a cycle."""
+
+    seeds: tuple[Annotated[int, Field(ge=1)], ...] = (1, 2, 3)
+    cycles: Annotated[int, Field(ge=1)] = 8
+    discard: Annotated[int, Field(ge=0)] = 3
+    updates_per_cycle: Annotated[int, Field(ge=64)] = 512
+    samples_per_cycle: Annotated[int, Field(ge=16)] = 128
+    dump_per_cycle: Annotated[int, Field(ge=0)] = 16
+
+    @field_validator("seeds", mode="before")
+    @classmethod
+    def count(cls, value: Any) -> Any:
+        if isinstance(value, int) and not isinstance(value, bool):
+            if value < 1:
+                raise reject(f"{value}", "at least one seed")
+            return tuple(range(1, value + 1))
+        return value
+
+    @model_validator(mode="after")
+    def consistent(self) -> "RunInput":
+        if self.discard >= self.cycles:
+            raise reject(f"{self.discard}", f"fewer than cycles = {self.cycles}", key="discard")
+        if self.updates_per_cycle % self.samples_per_cycle:
+            raise reject(
+                f"{self.samples_per_cycle}", "a divisor of updates_per_cycle", key="samples_per_cycle"
+            )
+        if len(set(self.seeds)) < len(self.seeds) or not self.seeds:
+            raise reject(f"{list(self.seeds)}", "a number of seeds or a list of different ones", key="seeds")
+        return self
+
+
+class ProfileInput(Section):
+    """`mean_velocity`: scale the fitted profile to this cycle mean; `residence_length`: of the distribution."""
+
+    mean_velocity: Speed | None = None
+    residence_length: Length = 5e-3
+
+
+class DemCase(Section):
+    """A powder file."""
+
+    title: str = "DEM substudy"
+    powder: PowderInput
+    waveform: WaveformInput
+    box: BoxInput = BoxInput()
+    gas: GasInput | None = None
+    run: RunInput = RunInput()
+    profile: ProfileInput = ProfileInput()
+    directory: Annotated[Path, Field(exclude=True)] = Path()
+
+    @field_validator("powder", mode="before")
+    @classmethod
+    def by_name(cls, value: Any) -> Any:
+        return {"base": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def baffle_fits(self) -> "DemCase":
+        if (
+            self.box.base == "sawtooth"
+            and self.box.baffle_width > self.box.length * self.build_powder().diameter
+        ):
+            raise reject(f"{self.box.baffle_width:g} m", "up to box.length", key="box.baffle_width")
+        return self
+
+    def build_powder(self) -> Powder:
+        return self.powder.build()
+
+    def build_waveform(self) -> Waveform:
+        return self.waveform.build(self.directory)
+
+    def diameters(self) -> np.ndarray:
+        """Diameters of the size classes [m]."""
+        return self.build_powder().size_classes(self.box.size_classes)
+
+    def to_toml(self) -> str:
+        """The resolved file, runnable as it is (paths of data files made absolute)."""
+        data = self.model_dump(mode="json", exclude_none=True)
+        if isinstance(self.waveform, MeasuredInput):
+            data["waveform"]["file"] = str((self.directory / self.waveform.file).resolve())
+        return tomli_w.dumps(data)
+
+    def content_hash(self) -> str:
+        """Identifies what determines one seed's trajectory: all but the title, the seeds and the profile."""
+        data = self.model_dump(mode="json", exclude={"title", "profile"})
+        for key in ("seeds", "cycles", "discard"):
+            data["run"].pop(key)
+        return hashlib.sha256(repr(data).encode()).hexdigest()[:16]
+
+
+def load_case(source: Path | str | Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> DemCase:
+    """Read a powder file or a dict, with dotted overrides such as {"box.stiffness": "3 N/m"}."""
+    if isinstance(source, Mapping):
+        name, directory, data = "powder file", Path(), dict(source)
+    else:
+        path = Path(source)
+        name, directory = str(path), path.parent
+        try:
+            data = tomllib.loads(path.read_text())
+        except OSError as error:
+            raise InputError(f"{name}: cannot be read ({error.strerror})") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{name}: not a TOML file ({error})") from None
+    if "directory" in data:
+        raise InputError(f"{name}: directory: unknown key")
+    for key, value in (overrides or {}).items():
+        data = set_dotted(data, key, value)
+    try:
+        return DemCase.model_validate({**data, "directory": directory})
+    except ValidationError as error:
+        raise InputError(one_line(name, error, DemCase)) from None

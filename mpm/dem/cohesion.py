@@ -1,0 +1,78 @@
+"""Van der Waals cohesion after Rumpf (2-6, 3-8), as a function and as the tables LAMMPS interpolates."""
+
+from pathlib import Path
+
+import numpy as np
+
+INNER_CUTOFF = 0.3e-9  # m, smallest distance between molecules; the force is held below it and in contact
+OUTER_CUTOFF = 10e-9  # m, no force beyond it
+TABLE_SPACING = 0.1e-9  # m; error of the interpolated force <= 0.5 % of its maximum
+TABLE_OVERLAP = 0.05  # part of the contact distance the table reaches into the overlap
+
+
+def rumpf_force(separation: np.ndarray, hamaker: float, radius: float, asperity: float) -> np.ndarray:
+    """Attractive force [N] at the surface separation s [m], any shape.
+
+    F = A R/(6 s^2) (r/(r + R) + 1/(1 + r/s)^2); R = R1 R2/(R1 + R2) between particles and the particle's own
+    radius at a flat base, which gives the seed's granular Bond numbers; r the asperity height. s is held at
+    0.3 nm from below, and the force ends at 10 nm.
+    """
+    separation = np.asarray(separation, dtype=float)
+    s = np.maximum(separation, INNER_CUTOFF)
+    force = (
+        hamaker * radius / (6.0 * s**2) * (asperity / (asperity + radius) + 1.0 / (1.0 + asperity / s) ** 2)
+    )
+    return np.where(separation <= OUTER_CUTOFF, force, 0.0)
+
+
+def largest_force(hamaker: float, radius: float, asperity: float) -> float:
+    """The force in contact [N], the numerator of the granular Bond number."""
+    return float(rumpf_force(np.asarray(0.0), hamaker, radius, asperity))
+
+
+def reduced_hamaker(hamaker: float, stiffness: float, material_stiffness: float) -> float:
+    """A_r = A sqrt(k_r/k_m): keeps the work of adhesion over the elastic energy when the spring is softened."""
+    return hamaker * (stiffness / material_stiffness) ** 0.5
+
+
+def table_points(contact: float) -> int:
+    """Number of points that cover overlap and range of one contact distance [m] at `TABLE_SPACING`."""
+    return int((TABLE_OVERLAP * contact + OUTER_CUTOFF + 2e-9) / TABLE_SPACING) + 1
+
+
+def table_text(
+    keyword: str,
+    contact: float,
+    points: int,
+    hamaker: float,
+    radius: float,
+    asperity: float,
+    wall: bool = False,
+) -> str:
+    """One section of a LAMMPS table file over the distance of centres (or centre to wall).
+
+    `contact` is that distance at contact [m]. Pair tables are equidistant in r^2 (style and file agree in
+    `points`, so LAMMPS takes the values as they are), wall tables in r. The energy is the integral of the
+    force from the outer end.
+    """
+    low, high = contact * (1.0 - TABLE_OVERLAP), contact + OUTER_CUTOFF + 2e-9
+    if wall:
+        r = np.linspace(low, high, points)
+    else:
+        r = np.sqrt(np.linspace(low**2, high**2, points))
+    attraction = rumpf_force(r - contact, hamaker, radius, asperity)
+    steps = 0.5 * (attraction[1:] + attraction[:-1]) * np.diff(r)
+    energy = -np.append(np.cumsum(steps[::-1])[::-1], 0.0)
+    head = f"N {points}" if wall else f"N {points} RSQ {low:.17g} {high:.17g}"
+    rows = "\n".join(
+        f"{i} {a:.16g} {b:.12g} {c:.12g}"
+        for i, (a, b, c) in enumerate(
+            zip(r.tolist(), energy.tolist(), (-attraction).tolist(), strict=True), 1
+        )
+    )
+    return f"# Rumpf cohesion, SI units\n\n{keyword}\n{head}\n\n{rows}\n"
+
+
+def write_table(path: Path, *sections: str) -> None:
+    """Write the sections of `table_text` into one file."""
+    path.write_text("\n".join(sections))

@@ -1,0 +1,91 @@
+"""Powders: size, shape and contact properties of the particles, with the seed's five as built-ins."""
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+
+from .relations import GRAVITY
+
+
+@dataclass(frozen=True)
+class Powder:
+    """Particles and what they do on contact with each other and with the base (SI).
+
+    diameter, deviation: mean and standard deviation of a normal distribution by number [m];
+    friction, restitution: particle-particle, and `wall_*` particle-base;
+    hamaker [J], asperity [m]: of the Rumpf force (2-6), zero Hamaker constant = no cohesion;
+    stiffness [N/m]: linearised stiffness of the real material, the k_m of the cohesion scaling;
+    ergun: factors A and B of the drag law; measured_umf: the seed's fluidisation test [m/s], None when untested.
+    """
+
+    name: str
+    diameter: float
+    deviation: float
+    density: float
+    sphericity: float
+    friction: float = 0.273
+    wall_friction: float = 0.4
+    restitution: float = 0.97
+    wall_restitution: float = 0.83
+    hamaker: float = 3.1e-20
+    wall_hamaker: float = 6.2e-20
+    asperity: float = 1e-9
+    stiffness: float = 2500.0
+    ergun: tuple[float, float] = (150.0, 1.75)
+    measured_umf: float | None = None
+    source: str = ""
+
+    @property
+    def mass(self) -> float:
+        """Mass of a sphere of the mean diameter [kg]."""
+        return self.density * math.pi / 6.0 * self.diameter**3
+
+    @property
+    def weight(self) -> float:
+        """Weight of a sphere of the mean diameter [N]."""
+        return self.mass * GRAVITY
+
+    def size_classes(self, count: int) -> np.ndarray:
+        """Diameters [m] of `count` equally frequent classes of the normal size distribution, shape (count,).
+
+        Each is the mean of its quantile interval, stretched so that the standard deviation of the classes is
+        the powder's (few classes would otherwise lose the tails). One class: the mean diameter.
+        """
+        if count == 1 or self.deviation == 0.0:
+            return np.array([self.diameter])
+        normal = NormalDist()
+        # Mean of a standard normal between two quantiles: count * (pdf(lower) - pdf(upper)).
+        edges = [0.0, *(normal.pdf(normal.inv_cdf(i / count)) for i in range(1, count)), 0.0]
+        score = count * (np.array(edges[:-1]) - np.array(edges[1:]))
+        sizes = self.diameter + self.deviation * score / score.std()
+        return np.maximum(sizes, 0.2 * self.diameter)
+
+
+_GLASS = (
+    "friction, restitution, Hamaker constants, asperity: table 2.1; stiffness: supplement B; "
+    "sizes and sphericity: table 3.2; u_mf: section 3.4.2"
+)
+_COARSE = "no cohesion and a base friction of 0.42: section 3.3.4 and table 4.1; else as the fine glass"
+
+POWDERS: dict[str, Powder] = {
+    powder.name: powder
+    for powder in (
+        Powder(
+            "GL50", 50e-6, 0.0, 2500.0, 0.79,
+            source="table 2.1 (sieve cut 45-63 um, simulated as one size); sphericity assumed that of GL56",
+        ),
+        Powder("GL29", 29e-6, 8.1e-6, 2500.0, 0.78, measured_umf=0.175e-2, source=_GLASS),
+        Powder("GL56", 56e-6, 13.9e-6, 2500.0, 0.79, measured_umf=0.35e-2, source=_GLASS),
+        Powder(
+            "GL223", 223e-6, 53.5e-6, 2500.0, 0.80, wall_friction=0.42, hamaker=0.0, wall_hamaker=0.0,
+            measured_umf=5e-2, source=_COARSE,
+        ),
+        Powder(
+            "SS231", 231e-6, 64.2e-6, 7500.0, 0.81, wall_friction=0.42, hamaker=0.0, wall_hamaker=0.0,
+            ergun=(248.0, 1.75), measured_umf=10e-2,
+            source="sizes: table 3.2; Ergun's A: section 3.4.2; contact values assumed those of glass",
+        ),
+    )
+}  # fmt: skip
