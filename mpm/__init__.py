@@ -1,0 +1,45 @@
+"""Moving porous media: an open model of vibrating powder reactors for atomic layer deposition, on FEniCSx.
+
+    from mpm import Reactor, load_case
+
+    result = Reactor(load_case("single_zone")).run()
+
+Names are imported on first use, so that `import mpm` needs neither dolfinx nor MPI.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mpm.case import Case as Case
+    from mpm.case import load_case as load_case
+    from mpm.errors import ConvergenceError as ConvergenceError
+    from mpm.errors import InputError as InputError
+    from mpm.errors import Interrupted as Interrupted
+    from mpm.errors import MpmError as MpmError
+    from mpm.geometry import Grid as Grid
+    from mpm.reactor import Reactor as Reactor
+
+_HOME = {
+    "Case": "mpm.case",
+    "load_case": "mpm.case",
+    "ConvergenceError": "mpm.errors",
+    "InputError": "mpm.errors",
+    "Interrupted": "mpm.errors",
+    "MpmError": "mpm.errors",
+    "Grid": "mpm.geometry",
+    "Reactor": "mpm.reactor",
+    "load_sweep": "mpm.sweep",
+}
+__all__ = sorted(_HOME)  # noqa: PLE0605
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *_HOME]

@@ -1,0 +1,283 @@
+"""A case: everything that defines one simulation, read from TOML, checked, in SI units.
+
+The classes here are parser, JSON Schema and dump at once. Conversion of units happens while they are built (see
+`mpm.units`); what a case file leaves out is filled in, so that `case.to_toml()` shows every value that is used.
+
+    case = load_case("cases/single_zone.toml", {"geometry.inlet.tma.velocity": "4 cm/s"})
+    faster = case.with_({"motion.gamma": 0.4})
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, PrivateAttr, Strict, ValidationError, model_validator
+
+from mpm.caseio import assemble, built_in_files, find_file, read_toml, write_toml
+from mpm.chemistry import Mechanism
+from mpm.constants import GRAVITY
+from mpm.errors import InputError
+from mpm.gases import CARRIERS, ideal_gas_density
+from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
+from mpm.materials import Material
+from mpm.mechanism import Chemistry, build_mechanism
+from mpm.messages import to_input_error
+from mpm.profile import check_profile
+from mpm.units import (
+    Angle,
+    Density,
+    Diffusivity,
+    Duration,
+    Frequency,
+    Instant,
+    MolarMass,
+    NonNegative,
+    Pressure,
+    Speed,
+    Temperature,
+    Velocity,
+    Viscosity,
+    reject,
+)
+
+__all__ = [
+    "Case", "Gas", "Geometry", "Inlet", "Layer", "Material", "Motion", "Outlet", "Output", "Time", "Transport", "Zone",
+    "case_schema", "load_case",
+]
+
+
+class Gas(Frozen):
+    """The carrier gas, whose density and viscosity are those of the mixture (precursors are dilute).
+
+    molar_mass, viscosity, density: by default from the carrier's property model (`mpm.gases`) and the ideal gas law;
+    diffusivity: one value per species of the mechanism, in free gas.
+    """
+
+    carrier: str = "N2"
+    temperature: Temperature = 473.0
+    pressure: Pressure = 101325.0
+    molar_mass: MolarMass = 0.0
+    viscosity: Viscosity = 0.0
+    density: Density = 0.0
+    diffusivity: Annotated[
+        dict[str, Diffusivity],
+        Field(json_schema_extra={"anyOf": [{"type": "string"}, {"type": "object"}], "type": None}),
+    ] = {}
+
+    @model_validator(mode="after")
+    def _fill_in(self) -> Self:
+        model, values, given = CARRIERS.get(self.carrier), self.__dict__, self.model_fields_set
+        if model is None and not {"molar_mass", "viscosity"} <= given:
+            raise reject(repr(self.carrier), f"one of {', '.join(CARRIERS)}, or any name with molar_mass and viscosity",
+                         key="carrier", given=self.carrier, known=list(CARRIERS))
+        if "molar_mass" not in given and model is not None:
+            values["molar_mass"] = model.molar_mass
+        if "viscosity" not in given and model is not None:
+            values["viscosity"] = model.viscosity(self.temperature)
+        if "density" not in given:
+            values["density"] = ideal_gas_density(self.pressure, self.molar_mass, self.temperature)
+        return self
+
+
+class Motion(Frozen):
+    """Vibration of the reactor and conveying of the bed.
+
+    gamma: vertical acceleration over g (0: the bed moves steadily at bed_velocity); angle [rad] of the vibration,
+    measured from the horizontal or from the vertical; bed_velocity [m/s]: cycle mean in the reactor's frame;
+    profile: thesis (lift-off at liftoff_velocity), phases (liftoff_phase, contact_phase [rad]), or the path of a CSV
+    file from `mpm dem`; inlet_frame: what the inlets are fixed to; start [s] of the vibration; startup: begin in the
+    periodic state (developed) or keep the true transient (impulsive).
+    """
+
+    gamma: NonNegative = 0.30
+    frequency: Frequency = 16.0
+    angle: Angle = math.pi / 3.0
+    angle_from: Literal["horizontal", "vertical"] = "horizontal"
+    bed_velocity: Speed = 0.013
+    profile: str = "thesis"
+    liftoff_velocity: Velocity = -0.004
+    liftoff_phase: Angle | None = None
+    contact_phase: Angle | None = None
+    inlet_frame: Literal["reactor", "lab"] = "reactor"
+    start: Instant = 0.05
+    startup: Literal["developed", "impulsive"] = "developed"
+
+    @property
+    def peak_vertical_velocity(self) -> float:
+        """Amplitude of the reactor's vertical velocity, Gamma g / w [m/s]."""
+        return self.gamma * GRAVITY / (2.0 * math.pi * self.frequency)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        low, high = (0.0, math.pi / 2.0)
+        steep = self.angle <= low if self.angle_from == "horizontal" else self.angle >= high
+        if not low <= self.angle <= high or steep:
+            raise reject(f"{math.degrees(self.angle):g} deg from the {self.angle_from}",
+                         "an angle from 0 deg to 90 deg that leaves a vertical component", key="angle")
+        if self.gamma == 0.0:
+            return self
+        if self.profile == "thesis":
+            peak = self.peak_vertical_velocity
+            if not -peak < self.liftoff_velocity < 0.0:
+                raise reject(f"{self.liftoff_velocity:g} m/s", f"between 0 m/s and the reactor's peak velocity, {-peak:.4g} m/s",
+                             key="liftoff_velocity")
+        elif self.profile == "phases":
+            for key in ("liftoff_phase", "contact_phase"):
+                value = getattr(self, key)
+                if value is None or not 0.0 <= value < 2.0 * math.pi:
+                    raise reject("nothing" if value is None else f"{math.degrees(value):g} deg",
+                                 'an angle from 0 deg to below 360 deg, e.g. "97.85 deg", for profile = "phases"', key=key)
+            if self.liftoff_phase == self.contact_phase:
+                raise reject("the phase of lift-off", "another phase", key="contact_phase")
+        else:
+            check_profile(Path(self.profile), "profile")
+        return self
+
+
+class Time(Frozen):
+    """End of the simulation [s]; `step` [s] of the averaged, `steps_per_cycle` of the resolved fidelity."""
+
+    end: Duration = 20.0
+    step: Duration = 0.01
+    steps_per_cycle: Annotated[int, Strict(), Field(ge=4)] = 32
+
+
+class Output(Frozen):
+    """Simulated time between outputs [s]; wall time between restart states [s]."""
+
+    every: Duration = 0.25
+    checkpoint: Duration = 60.0
+
+
+class Transport(Frozen):
+    """Options of the species' transport."""
+
+    vibrational_dispersion: Flag = False
+
+
+class Case(Frozen):
+    """One simulation. Equal cases have equal content, wherever they were read from."""
+
+    title: str = ""
+    fidelity: Literal["resolved", "averaged", "steady"] = "averaged"
+    geometry: Geometry
+    materials: dict[str, Material] = Field({}, alias="material")
+    gas: Gas = Gas()
+    chemistry: Chemistry = Chemistry()
+    motion: Motion = Motion()
+    time: Time = Time()
+    output: Output = Output()
+    transport: Transport = Transport()
+
+    _mechanism: Mechanism = PrivateAttr()
+    _source: Path | None = PrivateAttr(None)
+    _origin: tuple[Mapping[str, Any], Mapping[str, Any], Path, str] = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _resolve(self) -> Self:
+        self._mechanism = build_mechanism(self.chemistry)
+        for layer in self.geometry.layers:
+            if layer.material_name is not None:
+                layer._material = self.materials[layer.material_name]
+        self._check_chemistry()
+        peak = self.motion.peak_vertical_velocity
+        if self.motion.inlet_frame == "lab" and self.fidelity != "resolved":
+            for inlet in self.geometry.inlets:
+                if 0.0 < inlet.velocity < peak:
+                    raise reject(
+                        f"lab, with {inlet.name} at {inlet.velocity:g} m/s and a reactor at up to {peak:.4g} m/s: the port flow "
+                        "reverses within a cycle", 'fidelity = "resolved", inlet_frame = "reactor", or a faster inlet',
+                        key="motion.inlet_frame")
+        return self
+
+    def _check_chemistry(self) -> None:
+        species, sites = self._mechanism.species_names, self._mechanism.site_names
+        if self.gas.carrier in species:
+            raise reject(f"carrier {self.gas.carrier!r}, a species of the mechanism", "a gas that takes no part",
+                         key="gas.carrier")
+        for place, names, known in (
+            *((f"geometry.inlet.{i.name}.mass_fractions", i.mass_fractions, species) for i in self.geometry.inlets),
+            *((f"material.{name}.initial_coverage", m.initial_coverage, sites) for name, m in self.materials.items()),
+            ("gas.diffusivity", self.gas.diffusivity, species),
+        ):
+            for name in names:
+                if name not in known:
+                    kind = "site" if known is sites else "species"
+                    raise reject(f"a {kind} that the mechanism does not have", f"one of {', '.join(known)}",
+                                 key=f"{place}.{name}", given=name, known=list(known))
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The reaction mechanism, overrides included."""
+        return self._mechanism
+
+    @property
+    def source(self) -> Path | None:
+        """The file the case was read from, if any."""
+        return self._source
+
+    def with_(self, changes: Mapping[str, Any]) -> Case:
+        """Return the case that the same file gives with these dotted keys changed; everything is checked anew."""
+        data, overrides, folder, label = self._origin
+        case = _build(data, {**overrides, **changes}, folder, label)
+        case._source = self._source
+        return case
+
+    def to_dict(self) -> dict[str, Any]:
+        """The resolved case as the tables of a case file, dimensional values as strings in SI units."""
+        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
+
+    def to_toml(self) -> str:
+        """The resolved case as a case file that can be run as it is."""
+        return write_toml(self.to_dict())
+
+    def content_hash(self) -> str:
+        """Hexadecimal digest of everything that determines the results; a motion profile counts with its content."""
+        content = self.to_dict()
+        if self.motion.profile not in ("thesis", "phases"):
+            content["motion"]["profile"] = Path(self.motion.profile).read_text()
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Case) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(self.content_hash())
+
+
+def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> Case:
+    """Read and check a case.
+
+    source: path of a TOML file, name of a built-in case, or the tables themselves (paths in them are then relative
+    to the working directory). overrides: dotted keys, list entries by name, as `{"geometry.inlet.tma.start": "5 s"}`.
+    Raises InputError, whose message is one line.
+    """
+    if isinstance(source, Mapping):
+        return _build(source, overrides or {}, Path.cwd(), "case")
+    path = Path(source)
+    if isinstance(source, str) and not path.is_file() and source in built_in_files("cases"):
+        path = find_file("cases", source, Path.cwd(), source, "")
+    case = _build(read_toml(path), overrides or {}, path.resolve().parent, str(source))
+    case._source = path
+    return case
+
+
+def case_schema() -> dict[str, Any]:
+    """JSON Schema of a case file, for editors."""
+    schema = Case.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _build(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, label: str) -> Case:
+    tables = assemble(data, overrides, folder, label)
+    try:
+        case = Case.model_validate(tables)
+    except ValidationError as error:
+        raise to_input_error(error, Case, tables, label) from None
+    case._origin = (data, dict(overrides), folder, label)
+    return case

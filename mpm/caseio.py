@@ -1,0 +1,205 @@
+"""Reading and writing of case files as plain tables, before and after they are validated.
+
+A case is put together from several sources: the file, the shared geometry that it names as `geometry.base`, the
+built-in materials and the reaction mechanism it refers to, and overrides by dotted key (`--set`, sweeps). They are
+merged here, later ones over earlier ones; entries of lists are matched by their `name`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from mpm.errors import InputError
+from mpm.materials import BUILT_IN
+
+Table = dict[str, Any]
+
+DEFAULT_DIFFUSIVITY = "2.88e-5 m^2/s"
+"""The thesis left mixture properties at the defaults of its solver, which has this value for all species."""
+
+_REPLACES = {
+    "sticking": ("A", "b", "Ea", "reference_temperature"),
+    "A": ("sticking",),
+    "windows": ("start", "stop"),
+    "kozeny_constant": ("permeability",),
+    "permeability": ("kozeny_constant",),
+}
+"""A key written over a table removes the other ways to say the same from it."""
+
+
+def read_toml(path: Path) -> Table:
+    """Parse a TOML file; InputError when it is missing, unreadable or no TOML."""
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise InputError.at(path, "", "no such file", "the path of a TOML file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError.at(path, "", f"an unreadable file ({error})", "a TOML file") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError.at(path, "", f"a TOML syntax error ({error})", "valid TOML") from None
+
+
+def built_in_files(folder: str) -> dict[str, Path]:
+    """Names and paths of the files that come with mpm in `folder`: cases, meshes or mechanisms."""
+    package = Path(__file__).parent
+    files = {path.stem: path for place in (package, package.parent) for path in (place / folder).glob("*.toml")}
+    return dict(sorted(files.items()))
+
+
+def find_file(folder: str, name: str, near: Path, source: str, key: str) -> Path:
+    """The file that `name` stands for: a path relative to the folder `near`, or a built-in of `folder`."""
+    built_in = built_in_files(folder)
+    if name in built_in and not (near / name).is_file():
+        return built_in[name]
+    path = near / name
+    if not path.is_file():
+        raise InputError.at(source, key, f"{name!r}, no such file", f"a path, or one of {', '.join(built_in)}",
+                            given=name, known=built_in)
+    return path.resolve()
+
+
+def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:
+    """Lay table `over` upon table `under`: tables merge by key, lists of named tables by name, all else is replaced."""
+    result = {key: value for key, value in under.items() if not any(key in _REPLACES.get(new, ()) for new in over)}
+    for key, value in over.items():
+        below = result.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            result[key] = merge(below, value)
+        elif _named(value) and _named(below):
+            result[key] = _merge_lists(below, value)
+        else:
+            result[key] = deepcopy(value)
+    return result
+
+
+def _named(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) and "name" in v for v in value)
+
+
+def _merge_lists(under: list[Table], over: list[Table]) -> list[Table]:
+    result = [dict(entry) for entry in under]
+    places = {entry["name"]: i for i, entry in enumerate(result)}
+    for entry in over:
+        place = places.pop(entry["name"], None)  # a second entry of the same name is appended, and found out later
+        if place is None:
+            result.append(deepcopy(dict(entry)))
+        else:
+            result[place] = merge(result[place], entry)
+    return result
+
+
+def set_key(data: Table, key: str, value: Any, source: str) -> None:
+    """Set the entry at a dotted key such as `geometry.inlet.tma.velocity`; list entries are addressed by their name."""
+    node: Any = data
+    parts = key.split(".")
+    for i, part in enumerate(parts[:-1]):
+        place = ".".join(parts[: i + 1])
+        if isinstance(node, dict):
+            node = node.setdefault(part, {})
+        else:
+            node = _entry(node, part, place, source)
+        if not isinstance(node, (dict, list)):
+            raise InputError.at(source, key, f"{place} = {node!r}", f"a key; {place} has no parts")
+    if isinstance(node, list):
+        raise InputError.at(source, key, "a whole entry", "a key of that entry, such as name", given="")
+    value = value.tolist() if hasattr(value, "tolist") else value  # numpy scalars and arrays
+    for rival in _REPLACES.get(parts[-1], ()):
+        node.pop(rival, None)
+    node[parts[-1]] = deepcopy(value)
+
+
+def _entry(entries: list[Any], name: str, place: str, source: str) -> Any:
+    named = {str(entry.get("name")): entry for entry in entries if isinstance(entry, dict)}
+    if name not in named:
+        raise InputError.at(source, place, f"no entry named {name!r}", f"one of {', '.join(named)}", known=named)
+    return named[name]
+
+
+def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, source: str) -> Table:
+    """Put a complete table together from the file's own, everything it refers to, and the overrides.
+
+    Paths in the file are relative to `folder`; `source` is what messages call the file. Entries of a wrong type are
+    left as they are: validation, which comes next, says so.
+    """
+    result: Table = deepcopy(dict(data))
+    for key in ("geometry.base", "chemistry.mechanism"):  # these decide what the other keys refer to
+        if key in overrides:
+            set_key(result, key, overrides[key], source)
+    geometry = _table(result, "geometry")
+    if isinstance(geometry.get("base"), str):
+        path = find_file("meshes", geometry.pop("base"), folder, source, "geometry.base")
+        shared = read_toml(path)
+        result["geometry"] = merge(shared.get("geometry", {}), geometry)
+    _insert_mechanism(result, folder, source)
+    gas = result.setdefault("gas", {})
+    if isinstance(gas, dict) and not isinstance(gas.get("diffusivity", {}), dict):
+        gas["diffusivity"] = {"default": gas["diffusivity"]}
+    for key, value in overrides.items():
+        set_key(result, key, value, source)
+    _insert_materials(result, source)
+    _spread_diffusivity(result)
+    profile = _table(result, "motion").get("profile", "thesis")
+    if isinstance(profile, str) and profile not in ("thesis", "phases"):
+        result["motion"]["profile"] = str((folder / profile).resolve())
+    return result
+
+
+def _table(data: Mapping[str, Any], key: str) -> Table:
+    value = data.get(key, {})
+    return value if isinstance(value, dict) else {}
+
+
+def _insert_mechanism(data: Table, folder: Path, source: str) -> None:
+    chemistry = data.setdefault("chemistry", {})
+    name = chemistry.setdefault("mechanism", "alumina") if isinstance(chemistry, dict) else None
+    if not isinstance(name, str) or name == "inline":
+        return
+    path = find_file("mechanisms", name, folder, source, "chemistry.mechanism")
+    data["chemistry"] = merge({"name": path.stem, **read_toml(path)}, chemistry)
+    if path != built_in_files("mechanisms").get(name):
+        data["chemistry"]["mechanism"] = "inline"  # the tables are all here now: the case no longer needs the file
+
+
+def _insert_materials(data: Table, source: str) -> None:
+    given = data.setdefault("material", {})
+    layers = _table(data, "geometry").get("layer", [])
+    if not isinstance(given, dict) or not isinstance(layers, list):
+        return
+    for layer in layers:
+        name = layer.get("material") if isinstance(layer, dict) else None
+        if not isinstance(name, str):
+            continue
+        if name not in given and name not in BUILT_IN:
+            known = [*given, *BUILT_IN]
+            raise InputError.at(source, f"geometry.layer.{layer.get('name', '?')}.material", repr(name),
+                                f"a table [material.{name}], or one of {', '.join(known)}", given=name, known=known)
+        given.setdefault(name, {})
+    sites = list(_table(_table(data, "chemistry"), "site"))
+    for name, table in given.items():
+        if isinstance(table, dict):
+            given[name] = table = merge(BUILT_IN.get(name, {}), table)
+            coverage = table.setdefault("initial_coverage", dict.fromkeys(sites[:1], 1.0))
+            if isinstance(coverage, dict):
+                table["initial_coverage"] = {**dict.fromkeys(sites, 0.0), **coverage}
+
+
+def _spread_diffusivity(data: Table) -> None:
+    gas = _table(data, "gas")
+    values = gas.get("diffusivity", {})
+    if isinstance(values, (dict, str)):
+        values = {"default": values} if isinstance(values, str) else dict(values)
+        default = values.pop("default", DEFAULT_DIFFUSIVITY)
+        species = _table(_table(data, "chemistry"), "species")
+        gas["diffusivity"] = {**dict.fromkeys(species, default), **values}
+
+
+def write_toml(data: Mapping[str, Any]) -> str:
+    """Format a table as TOML; lists of tables come as `[[...]]`, everything else on its own line."""
+    return tomli_w.dumps(data, indent=2)

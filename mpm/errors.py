@@ -1,0 +1,71 @@
+"""The errors that mpm raises on purpose, and the exit status each of them means on the command line."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class MpmError(Exception):
+    """Base of every error that has a message for the user; the command line prints it without a traceback."""
+
+    exit_status = 1
+
+
+class InputError(MpmError):
+    """Input that cannot be used: the message is one line that names file, key, finding and what is accepted.
+
+    `InputError("text")` takes a finished line; `InputError.at(...)` composes one from its parts.
+    """
+
+    exit_status = 2
+
+    @classmethod
+    def at(
+        cls,
+        source: str | Path | None,
+        key: str,
+        found: str,
+        accepted: str,
+        *,
+        known: Iterable[str] = (),
+        given: str = "",
+    ) -> InputError:
+        """Compose `FILE: key: found X; accepted: Y (did you mean Z?)`.
+
+        `known` are the names that would have been right, `given` the one that was written (default: the
+        last part of `key`); the nearest of them is suggested when one is close.
+        """
+        parts = [str(source)] if source is not None else []
+        if key:
+            parts.append(key)
+        line = ": ".join([*parts, f"found {found}; accepted: {accepted}"]) + suggestion(
+            given or key.rpartition(".")[2], known
+        )
+        return cls(" ".join(line.split()))
+
+
+class ConvergenceError(MpmError):
+    """A solver gave up; the message says which system, at which step, with which residual."""
+
+    exit_status = 3
+
+
+class Interrupted(MpmError):
+    """The run was asked to stop (Ctrl-C, SIGTERM); what was written is usable and `--resume` continues it."""
+
+    exit_status = 130
+
+
+def nearest(given: str, known: Iterable[str]) -> str | None:
+    """Return the one of `known` that `given` was probably meant to be, or None."""
+    by_lower = {name.lower(): name for name in known}
+    close = difflib.get_close_matches(given.lower(), by_lower, n=1, cutoff=0.6)
+    return by_lower[close[0]] if close else None
+
+
+def suggestion(given: str, known: Iterable[str]) -> str:
+    """Return ` (did you mean Z?)`, or nothing when no known name is close to the given one."""
+    close = nearest(given, known)
+    return f" (did you mean {close}?)" if close is not None and close != given else ""

@@ -1,0 +1,309 @@
+"""The `[geometry]` table: a strip of layers with inlets, outlets and zones, as frozen values.
+
+Positions count from the left end of the strip; layers from the bottom. What is checked here needs nothing but the
+geometry itself: names, ports inside the strip, no overlaps, no facet that an outlet shares with another port.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    Strict,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
+
+from mpm.materials import Material
+from mpm.units import Deadline, Dimension, Fraction, Instant, Length, Position, Positive, Speed, describe, reject
+
+_INSTANT = Dimension("s", "a time", "5 s", at_least=0.0)
+_DEADLINE = Dimension("s", "a time", "5 s", above=0.0, infinite=True)
+
+
+def _name(value: str) -> str:
+    if not value or not all(character.isalnum() or character in "_-" for character in value):
+        raise reject(repr(value), "a name of letters, digits, _ and -")
+    return value
+
+
+def _read_windows(value: Any) -> tuple[tuple[float, float], ...]:
+    accepted = 'a list of dose windows, e.g. [["0 s", "5 s"], ["10 s", "15 s"]], in order and apart'
+    if not isinstance(value, (list, tuple)) or not value:
+        raise reject(describe(value), accepted)
+    pairs = []
+    for pair in value:
+        if not isinstance(pair, (list, tuple)) or len(pair) != 2:
+            raise reject(f"the window {describe(pair)}", accepted)
+        pairs.append((_INSTANT.read(pair[0]), _DEADLINE.read(pair[1])))
+    times = [time for pair in pairs for time in pair]
+    if any(later <= earlier for earlier, later in zip(times[:-1], times[1:], strict=True)):
+        raise reject(" and ".join(f"a window from {a:g} s to {b:g} s" for a, b in pairs), accepted)
+    return tuple(pairs)
+
+
+def _write_windows(pairs: tuple[tuple[float, float], ...]) -> list[list[Any]]:
+    return [[_INSTANT.write(start), _DEADLINE.write(stop)] for start, stop in pairs]
+
+
+Name = Annotated[str, AfterValidator(_name)]
+Flag = Annotated[bool, Strict()]
+Count = Annotated[int, Strict(), Field(ge=1)]
+Windows = Annotated[
+    tuple[tuple[float, float], ...],
+    PlainValidator(_read_windows),
+    PlainSerializer(_write_windows, when_used="json"),
+    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "string"}}}),
+]
+
+
+class Frozen(BaseModel):
+    """Base of the tables of a case file: values that do not change, keys that are known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Layer(Frozen):
+    """A horizontal layer, `cells` rows high; `grading` is the height of its top row over that of its bottom row.
+
+    `material` (a Material; None: gas) is resolved by the case from the name that the file gives.
+    """
+
+    name: Name
+    height: Length
+    cells: Count
+    grading: Positive = 1.0
+    material_name: str | None = Field(None, alias="material", description="name of a material; none: gas")
+    moving: Flag = False
+    _material: Material | None = PrivateAttr(None)
+
+    @property
+    def material(self) -> Material | None:
+        return self._material
+
+
+class _Port(Frozen):
+    name: Name
+    center: Position
+    width: Length
+
+    @property
+    def x0(self) -> float:
+        """Left end [m]."""
+        return self.center - 0.5 * self.width
+
+    @property
+    def x1(self) -> float:
+        """Right end [m]."""
+        return self.center + 0.5 * self.width
+
+
+class Inlet(_Port):
+    """A stretch of wall that blows carrier gas, with `mass_fractions` of precursor in it during its `windows` [s].
+
+    In the file a single window is `start` and `stop`; several are `windows`.
+    """
+
+    side: Literal["bottom", "top"] = "bottom"
+    velocity: Speed = 0.035
+    mass_fractions: dict[str, Fraction] = {}
+    start: Instant = 0.0
+    stop: Deadline = math.inf
+    windows: Windows = ()
+
+    @model_validator(mode="after")
+    def _one_form_of_windows(self) -> Self:
+        if not self.windows:
+            if self.stop <= self.start:
+                raise reject(f"stop at {self.stop:g} s, start at {self.start:g} s", "a stop after the start",
+                             key="stop")
+            self.__dict__["windows"] = ((self.start, self.stop),)
+        elif self.model_fields_set & {"start", "stop"}:
+            raise reject("windows beside start or stop", "either start and stop, or windows", key="windows")
+        else:
+            self.__dict__.update(start=self.windows[0][0], stop=self.windows[-1][1])
+        total = sum(self.mass_fractions.values())
+        if total > 1.0:
+            raise reject(f"mass fractions that sum to {total:g}", "at most 1 in all", key="mass_fractions")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _write_one_form(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        table: dict[str, Any] = handler(self)
+        single = len(self.windows) == 1
+        for key in ("windows", *(["stop"] if self.stop == math.inf else [])) if single else ("start", "stop"):
+            table.pop(key, None)
+        return table
+
+    @property
+    def doses(self) -> bool:
+        """Whether this port is there for a precursor (its mass fraction may be zero) or only for carrier gas."""
+        return bool(self.mass_fractions)
+
+
+class Outlet(_Port):
+    """A stretch of wall at ambient pressure."""
+
+    side: Literal["bottom", "top"] = "top"
+
+
+class Zone(Frozen):
+    """A named stretch of the strip, from `start` to `end` [m], with the inlet that doses it."""
+
+    name: Name
+    start: Position
+    end: Length
+    inlet: str | None = None
+
+
+def _base_may_give_it(schema: dict[str, Any]) -> None:
+    """With `base`, no key of the geometry is required in the case file itself."""
+    schema.pop("required", None)
+
+
+class Geometry(Frozen):
+    """The strip: `length` [m], columns about `cell_width` [m] wide, layers bottom to top, ports and zones."""
+
+    model_config = ConfigDict(json_schema_extra=_base_may_give_it)
+
+    base: str | None = Field(None, exclude=True, description="a shared geometry file or built-in name that these keys override")
+    length: Length
+    cell_width: Length = 0.34e-3
+    periodic: Flag = True
+    bed_inflow: Literal["fresh", "periodic"] = "fresh"
+    inlet_diffusion: Flag = False
+    layers: tuple[Layer, ...] = Field(alias="layer", min_length=1)
+    inlets: tuple[Inlet, ...] = Field((), alias="inlet")
+    outlets: tuple[Outlet, ...] = Field((), alias="outlet")
+    zones: tuple[Zone, ...] = Field((), alias="zone")
+
+    @property
+    def columns(self) -> int:
+        """Number of equal columns: the nearest to length / cell_width."""
+        return max(1, round(self.length / self.cell_width))
+
+    @property
+    def dx(self) -> float:
+        """Width of a column [m]."""
+        return self.length / self.columns
+
+    @property
+    def moving_layer(self) -> Layer | None:
+        """The layer that is conveyed, if any."""
+        return next((layer for layer in self.layers if layer.moving), None)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.periodic and self.columns < 3:
+            raise reject(f"{self.columns} columns", "at least 3 columns in a periodic strip", key="cell_width")
+        _check_names("layer", self.layers)
+        _check_names("port", (*self.inlets, *self.outlets))
+        _check_names("zone", self.zones)
+        moving = [layer.name for layer in self.layers if layer.moving]
+        if len(moving) > 1:
+            raise reject(f"moving layers {', '.join(moving)}", "at most one moving layer", key=f"layer.{moving[1]}.moving")
+        for layer in self.layers:
+            if layer.moving and layer.material_name is None:
+                raise reject("a moving layer of gas", "a material for the moving layer", key=f"layer.{layer.name}.moving")
+        for port in (*self.inlets, *self.outlets):
+            _check_inside(f"{_kind(port)}.{port.name}", port.x0, port.x1, self.length)
+        for side in ("bottom", "top"):
+            self._check_side([port for port in (*self.inlets, *self.outlets) if port.side == side])
+        flow = sum(inlet.velocity for inlet in self.inlets)
+        if flow > 0.0 and not self.outlets:
+            raise reject("inlets but no outlet", "at least one outlet", key="outlet")
+        if not self.zones:
+            self.__dict__["zones"] = self._default_zones()
+        self._check_zones()
+        return self
+
+    def _check_side(self, ports: Sequence[Inlet | Outlet]) -> None:
+        """Ports on one side may not overlap, and an outlet may not share a facet (a column) with another port."""
+        tolerance = 1e-9 * self.length
+        ordered = sorted(ports, key=lambda port: port.x0)
+        for left, right in zip(ordered[:-1], ordered[1:], strict=True):
+            key, where = f"{_kind(right)}.{right.name}", f"{_span(right.x0, right.x1)} next to {left.name} at {_span(left.x0, left.x1)}"
+            if right.x0 < left.x1 - tolerance:
+                raise reject(where, "ports that do not overlap", key=f"{key}.center")
+            last_of_left = math.ceil((left.x1 - tolerance) / self.dx) - 1
+            first_of_right = math.floor((right.x0 + tolerance) / self.dx)
+            if last_of_left == first_of_right and (isinstance(left, Outlet) or isinstance(right, Outlet)):
+                raise reject(where, f"an outlet at least one column ({self.dx * 1e3:.3g} mm) away from other ports",
+                             key=f"{key}.center")
+
+    def _default_zones(self) -> tuple[Zone, ...]:
+        """As many equal zones as inlets that dose, provided that each contains the centre of one of them."""
+        dosing = sorted((inlet for inlet in self.inlets if inlet.doses), key=lambda inlet: inlet.center)
+        share = self.length / max(1, len(dosing))
+        if any(not i * share <= inlet.center <= (i + 1) * share for i, inlet in enumerate(dosing)):
+            raise reject(
+                f"no zones, and dosing inlets at {', '.join(f'{inlet.center * 1e3:g} mm' for inlet in dosing)}",
+                f"a list of zones, since {len(dosing)} equal zones would not hold one dosing inlet each", key="zone")
+        edges = [i * share for i in range(len(dosing))] + [self.length]
+        return tuple(
+            Zone(name=f"zone{i + 1}", start=f"{edges[i]!r} m", end=f"{edges[i + 1]!r} m", inlet=inlet.name)
+            for i, inlet in enumerate(dosing)
+        )
+
+    def _check_zones(self) -> None:
+        tolerance = 1e-9 * self.length
+        inlets = {inlet.name: inlet for inlet in self.inlets}
+        for zone in self.zones:
+            key = f"zone.{zone.name}"
+            if zone.end <= zone.start:
+                raise reject(_span(zone.start, zone.end), "an end after the start", key=f"{key}.end")
+            _check_inside(key, zone.start, zone.end, self.length)
+            if zone.end - zone.start < self.dx * (1.0 - 1e-9):
+                raise reject(_span(zone.start, zone.end), f"a zone of at least one column ({self.dx * 1e3:.3g} mm)", key=key)
+            if zone.inlet is None:
+                continue
+            if zone.inlet not in inlets:
+                raise reject(repr(zone.inlet), f"the name of an inlet: {', '.join(inlets) or 'there is none'}",
+                             key=f"{key}.inlet", given=zone.inlet, known=list(inlets))
+            if not zone.start - tolerance <= inlets[zone.inlet].center <= zone.end + tolerance:
+                raise reject(f"inlet {zone.inlet} at {inlets[zone.inlet].center * 1e3:g} mm",
+                             f"an inlet whose centre lies in the zone, {_span(zone.start, zone.end)}", key=f"{key}.inlet")
+        ordered = sorted(self.zones, key=lambda zone: zone.start)
+        for left, right in zip(ordered[:-1], ordered[1:], strict=True):
+            if right.start < left.end - tolerance:
+                raise reject(f"{_span(right.start, right.end)} and {left.name} at {_span(left.start, left.end)}",
+                             "zones that do not overlap", key=f"zone.{right.name}.start")
+        served = [zone.inlet for zone in self.zones if zone.inlet is not None]
+        for inlet in served:
+            if served.count(inlet) > 1:
+                raise reject(f"inlet {inlet} in {served.count(inlet)} zones", "at most one zone for each inlet", key="zone")
+
+
+def _kind(port: Inlet | Outlet) -> str:
+    return type(port).__name__.lower()
+
+
+def _span(start: float, end: float) -> str:
+    return f"{start * 1e3:g} mm to {end * 1e3:g} mm"
+
+
+def _check_inside(key: str, start: float, end: float, length: float) -> None:
+    tolerance = 1e-9 * length
+    if start < -tolerance or end > length + tolerance:
+        raise reject(_span(start, end), f"a stretch inside the strip, 0 mm to {length * 1e3:g} mm", key=key)
+
+
+def _check_names(kind: str, entries: Iterable[Layer | Inlet | Outlet | Zone]) -> None:
+    seen: set[str] = set()
+    for entry in entries:
+        if entry.name in seen:
+            table = type(entry).__name__.lower()
+            raise reject(f"{kind} name {entry.name!r} twice", f"a different name for every {kind}",
+                         key=f"{table}.{entry.name}.name")
+        seen.add(entry.name)

@@ -1,0 +1,183 @@
+"""Porous materials: the table `[material.NAME]` of a case, and the materials that need no table.
+
+Built-in values are those of the thesis, chapter 5: porosity, permeability and tortuosity factors from table 5.4
+(permeability is printed in "um^-2", um^2 is meant), surface to volume ratio, site density and solids from table
+5.3, particle size and sphericity of the glass beads (GL56) from table 3.2. Tables 5.3 and 5.4 disagree about the
+surface: 5.3, with which the thesis computed, has 58,000 1/m (bed) and 100,000 1/m (frit); 5.4 has 73,000 and
+62,000 1/m per total volume. Felt and mesh keep the frit value of 5.3, the only one it gives.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchema, model_validator
+
+from mpm.constants import AVOGADRO
+from mpm.units import (
+    Area,
+    Conductivity,
+    Density,
+    Dimension,
+    Fraction,
+    HeatCapacity,
+    Length,
+    PerLength,
+    Porosity,
+    Positive,
+    describe,
+    reject,
+)
+
+SITE_DENSITIES = {
+    "thesis": 6.92e-8,
+    "one-per-24-square-angstrom": 1.0 / (24e-20 * AVOGADRO),
+}
+"""Named site densities [mol/m2]. The thesis divides by "24 nm2" per site; the chemistry says 24 square angstrom,
+which gives 100 times as many sites: with it nothing titrates at the doses of the thesis."""
+
+_SITES = Dimension("mol/m^2", "a site density", "6.92e-8 mol/m^2", above=0.0)
+_AREA = Dimension("m^2", "a permeability", "4.25 um^2", above=0.0)
+_NUMBER = Dimension("", "a tortuosity factor", "1.48", above=0.0)
+
+
+def _site_density(value: Any) -> float:
+    if isinstance(value, str) and value in SITE_DENSITIES:
+        return SITE_DENSITIES[value]
+    if isinstance(value, str) and not any(character.isdigit() for character in value.split(" ")[0]):
+        names = ", ".join(SITE_DENSITIES)
+        raise reject(repr(value), f"{_SITES.accepted}, or a preset: {names}", given=value, known=list(SITE_DENSITIES))
+    return _SITES.read(value)
+
+
+def _per_direction(dimension: Dimension) -> tuple[Any, ...]:
+    """Annotations of a property that is one value, or two: along the reactor and through the layer."""
+
+    def read(value: Any) -> tuple[float, float]:
+        if not isinstance(value, (list, tuple)):
+            both = dimension.read(value)
+            return both, both
+        if len(value) != 2:
+            raise reject(describe(value), f"{dimension.accepted}, or two of them: along x, then along y")
+        return dimension.read(value[0]), dimension.read(value[1])
+
+    def write(pair: tuple[float, float]) -> Any:
+        return dimension.write(pair[0]) if pair[0] == pair[1] else [dimension.write(value) for value in pair]
+
+    one = {"type": "string" if dimension.unit else "number", "examples": [dimension.example]}
+    schema = {"anyOf": [one, {"type": "array", "items": one, "minItems": 2, "maxItems": 2}]}
+    return BeforeValidator(read), PlainSerializer(write, when_used="json"), WithJsonSchema(schema)
+
+
+# The inner type of the pairs is a bare float: `read` has converted it already.
+_PairOfAreas = Annotated[tuple[float, float], *_per_direction(_AREA)]
+_PairOfNumbers = Annotated[tuple[float, float], *_per_direction(_NUMBER)]
+_Sites = Annotated[
+    float,
+    BeforeValidator(_site_density),
+    PlainSerializer(_SITES.write, when_used="json"),
+    WithJsonSchema({"type": "string", "examples": [_SITES.example, *SITE_DENSITIES]}),
+]
+
+
+def _nothing_required(schema: dict[str, Any]) -> None:
+    """A table in a case may name a built-in material and change one key of it: editors must accept that."""
+    schema.pop("required", None)
+
+
+class Material(BaseModel):
+    """A rigid porous solid, homogeneous within its layer.
+
+    permeability: (k_x, k_y) [m2], given, or by Kozeny-Carman from particle_diameter, sphericity and kozeny_constant;
+    tortuosity_factor: tau^2 along (x, y), by default Bruggeman's porosity**-0.5;
+    surface_to_volume: reactive surface per total volume [1/m], by default 6 (1 - porosity)/(sphericity d);
+    site_density [mol/m2 of surface]; initial_coverage: share of the sites in each state, sums to 1 (filled in with the
+    mechanism's first site, the fresh surface); viscosity_ratio: effective over gas viscosity in the Brinkman term.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_nothing_required)
+
+    porosity: Porosity
+    permeability: _PairOfAreas = (0.0, 0.0)
+    tortuosity_factor: _PairOfNumbers = (0.0, 0.0)
+    surface_to_volume: PerLength = -1.0
+    site_density: _Sites = SITE_DENSITIES["thesis"]
+    initial_coverage: dict[str, Fraction] = {}
+    viscosity_ratio: Positive = 1.0
+    density: Density | None = None
+    particle_diameter: Length | None = None
+    sphericity: Positive = 1.0
+    kozeny_constant: Positive | None = None
+    heat_capacity: HeatCapacity | None = None
+    conductivity: Conductivity | None = None
+
+    @model_validator(mode="after")
+    def _fill_in(self) -> Self:
+        given, d = self.model_fields_set, self.particle_diameter
+        values = self.__dict__
+        if "permeability" not in given:
+            if d is None or self.kozeny_constant is None:
+                raise reject("nothing", "a permeability, e.g. \"4.25 um^2\", or particle_diameter, sphericity and "
+                             "kozeny_constant", key="permeability")
+            k = kozeny_carman(self.porosity, d, self.sphericity, self.kozeny_constant)
+            values["permeability"] = (k, k)
+        if "tortuosity_factor" not in given:
+            values["tortuosity_factor"] = (self.porosity**-0.5,) * 2
+        if "surface_to_volume" not in given:
+            if d is None:
+                raise reject("nothing", 'a surface per total volume, e.g. "58000 1/m", or a particle_diameter',
+                             key="surface_to_volume")
+            values["surface_to_volume"] = (1.0 - self.porosity) * 6.0 / (self.sphericity * d)
+        if self.initial_coverage and abs(sum(self.initial_coverage.values()) - 1.0) > 1e-9:
+            raise reject(f"coverages that sum to {sum(self.initial_coverage.values()):g}", "coverages that sum to 1",
+                         key="initial_coverage")
+        return self
+
+
+def kozeny_carman(porosity: float, diameter: float, sphericity: float, constant: float) -> float:
+    """Permeability k = eps^3 / (c0 s_v^2 (1 - eps)^2) [m2] with s_v = 6/(phi d), the surface per solid volume.
+
+    Equation 5-1 of the thesis; c0 = 5 for packed spheres (Carman 1937), 4.2 fitted for its glass beads (table 5.4).
+    """
+    solid_surface = 6.0 / (sphericity * diameter)
+    return porosity**3 / (constant * (solid_surface * (1.0 - porosity)) ** 2)
+
+
+_STEEL = {"density": "8030 kg/m^3", "heat_capacity": "503 J/kg/K", "conductivity": "16.3 W/m/K"}
+
+BUILT_IN: dict[str, dict[str, Any]] = {
+    "glass_beads": {
+        "porosity": 0.46,
+        "permeability": "4.25 um^2",
+        "tortuosity_factor": 1.48,
+        "surface_to_volume": "58000 1/m",
+        "particle_diameter": "56 um",
+        "sphericity": 0.79,
+        "density": "2500 kg/m^3",
+        "heat_capacity": "871 J/kg/K",
+        "conductivity": "1.3 W/m/K",
+    },
+    "sintered_powder": {
+        "porosity": 0.37,
+        "permeability": "2.76 um^2",
+        "tortuosity_factor": [2.85, 2.68],
+        "surface_to_volume": "100000 1/m",
+        **_STEEL,
+    },
+    "frit_felt": {
+        "porosity": 0.68,
+        "permeability": "3.66 um^2",
+        "tortuosity_factor": [1.675, 1.40],
+        "surface_to_volume": "100000 1/m",
+        **_STEEL,
+    },
+    "frit_mesh": {
+        "porosity": 0.40,
+        "permeability": "17.93 um^2",
+        "tortuosity_factor": [1.775, 2.52],
+        "surface_to_volume": "100000 1/m",
+        **_STEEL,
+    },
+}
+"""Tables of the built-in materials, as a case file would write them. In-plane tortuosity factors are the means of the
+two directions of table 5.4 (the powder's 2.86 and 2.83 make 2.85)."""

@@ -1,0 +1,271 @@
+"""Reaction mechanisms are data: read from a file or a case, checked, and turned into `mpm.chemistry` values.
+
+A mechanism file (TOML; `mechanisms/alumina.toml` is the built-in one) lists species and sites with their molar mass,
+and reactions as equations `A + 2 B -> C`. Any table of it can be overridden by key in `[chemistry]` of a case,
+for instance `chemistry.reaction.tma.sticking = 0.1`; `mechanism = "inline"` starts from nothing.
+
+Every reaction is checked for the balance of its elements and of its sites when it is read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from mpm.chemistry import GasReaction, Mechanism, Site, Species, SurfaceReaction
+from mpm.units import Dimension, Fraction, MolarEnergy, MolarMass, NonNegative, Number, Temperature, parse, reject
+
+_SURFACE_RATE = Dimension("m/s", "a surface rate constant", "0.9 m/s", at_least=0.0)
+_GAS_RATE = Dimension("m^3/mol/s", "a second-order rate constant", "1.0 m^3/kmol/s", at_least=0.0)
+
+
+def _rate_constant(value: Any) -> str:
+    """Normalise a rate constant to SI but keep its unit: which of the two is right depends on the reaction."""
+    for dimension in (_SURFACE_RATE, _GAS_RATE):
+        if isinstance(value, str):
+            try:
+                parse(value, dimension.unit)
+            except ValueError:
+                continue
+            return str(dimension.write(dimension.read(value)))
+    raise reject(repr(value), f"{_SURFACE_RATE.accepted}, or {_GAS_RATE.accepted}")
+
+
+def _nothing_required(schema: dict[str, Any]) -> None:
+    """A table in a case may override one key of a mechanism's entry."""
+    schema.pop("required", None)
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_nothing_required)
+
+
+class SpeciesTable(_Table):
+    """`[species.NAME]`: a gas species; elements from `formula` (default: the name) or counted by hand."""
+
+    molar_mass: MolarMass
+    formula: str | None = None
+    elements: dict[str, NonNegative] | None = None
+
+
+class SiteTable(_Table):
+    """`[site.NAME]` (a state of the surface sites) or `[film.NAME]` (a solid product)."""
+
+    molar_mass: MolarMass | None = None
+    formula: str | None = None
+    elements: dict[str, NonNegative] | None = None
+
+
+class ReactionTable(_Table):
+    """`[reaction.KEY]`: an equation with either `sticking` or Arrhenius' `A`, `b`, `Ea`."""
+
+    equation: str
+    sticking: Fraction | None = None
+    A: Annotated[str, BeforeValidator(_rate_constant), WithJsonSchema({"type": "string"})] | None = None
+    b: Number = 0.0
+    Ea: MolarEnergy = 0.0
+    reference_temperature: Temperature = 1.0
+
+
+class Chemistry(_Table):
+    """The `[chemistry]` table, with the mechanism's own tables merged in: complete in itself."""
+
+    mechanism: str = Field("alumina", description="a built-in mechanism, the path of a mechanism file, or inline")
+    name: str = ""
+    species: dict[str, SpeciesTable] = {}
+    site: dict[str, SiteTable] = {}
+    film: dict[str, SiteTable] = {}
+    reaction: dict[str, ReactionTable] = {}
+
+
+_GROUP = re.compile(r"([A-Z][a-z]?)(\d*)|\(|\)(\d*)")
+
+
+def parse_formula(formula: str) -> dict[str, float]:
+    """Count the atoms of a formula such as `Al(CH3)3` or `OAl(CH3)2`; ValueError when it is none."""
+    stack: list[dict[str, float]] = [{}]
+    place = 0
+    while place < len(formula):
+        match = _GROUP.match(formula, place)
+        if match is None:
+            raise ValueError(f"{formula!r} is not a chemical formula")
+        place = match.end()
+        if match.group(1):
+            element, count = match.group(1), float(match.group(2) or 1)
+            stack[-1][element] = stack[-1].get(element, 0.0) + count
+        elif match.group() == "(":
+            stack.append({})
+        else:
+            if len(stack) == 1:
+                raise ValueError(f"{formula!r} closes a bracket that it did not open")
+            for element, count in stack.pop().items():
+                stack[-1][element] = stack[-1].get(element, 0.0) + count * float(match.group(3) or 1)
+    if len(stack) != 1:
+        raise ValueError(f"{formula!r} leaves a bracket open")
+    return stack[0]
+
+
+_TERM = re.compile(r"(\d+(?:\.\d+)?)?\s*(\S.*)$")
+
+
+def parse_equation(equation: str, known: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, float]]:
+    """Split `A + 2 B -> C` into the coefficients of its two sides; every name must be one of `known`.
+
+    Raises the validator error that names the unknown species, with its nearest neighbour.
+    """
+    sides: list[dict[str, float]] = []
+    for side in equation.split("->"):
+        terms: dict[str, float] = {}
+        for text in side.split(" + "):
+            match = _TERM.match(text.strip())
+            if match is None:
+                raise reject(repr(equation), 'an equation "A + 2 B -> C"', key="equation")
+            name, count = text.strip(), 1.0
+            if name not in known:
+                name, count = match.group(2), float(match.group(1) or 1)
+            if name not in known:
+                raise reject(f"{name!r} in {equation!r}", f"one of {', '.join(known)}", key="equation", given=name,
+                             known=list(known))
+            terms[name] = terms.get(name, 0.0) + count
+        sides.append(terms)
+    if len(sides) != 2:
+        raise reject(repr(equation), 'an equation with one "->"', key="equation")
+    return sides[0], sides[1]
+
+
+def write_equation(left: Mapping[str, float], right: Mapping[str, float]) -> str:
+    """Compose `A + 2 B -> C` from the coefficients of its two sides."""
+
+    def side(terms: Mapping[str, float]) -> str:
+        return " + ".join(name if count == 1.0 else f"{count:g} {name}" for name, count in terms.items())
+
+    return f"{side(left)} -> {side(right)}"
+
+
+def build_mechanism(chemistry: Chemistry) -> Mechanism:
+    """Assemble and check the mechanism of a complete `[chemistry]` table.
+
+    Raises validator errors (see `units.reject`) for unknown names, unbalanced elements or sites, and rate laws that
+    do not fit the kind of reaction.
+    """
+    species = {name: Species(name, table.molar_mass, _elements("species", name, table))
+               for name, table in chemistry.species.items()}
+    sites = {name: Site(name, _elements("site", name, table), table.molar_mass)
+             for name, table in chemistry.site.items()}
+    films = {name: Site(name, _elements("film", name, table), table.molar_mass)
+             for name, table in chemistry.film.items()}
+    seen: set[str] = set()
+    for kind, names in (("species", species), ("site", sites), ("film", films)):
+        for name in names:
+            if name in seen or "." in name:
+                raise reject(f"{name!r}", "a name without dots that no other species, site or film has",
+                             key=f"chemistry.{kind}.{name}")
+            seen.add(name)
+    known: dict[str, Species | Site] = {**species, **sites, **films}
+    surface, gas = [], []
+    for key, table in chemistry.reaction.items():
+        try:
+            left, right = parse_equation(table.equation, known)
+            _check_balance(table.equation, left, right, known, sites)
+            if any(name in sites for name in left):
+                surface.append(_surface_reaction(key, table, left, right, species, sites, films))
+            else:
+                gas.append(_gas_reaction(key, table, left, right, species))
+        except PydanticCustomError as error:
+            context = dict(error.context or {})
+            raise reject(**{**context, "key": f"chemistry.reaction.{key}.{context.get('key', 'equation')}"}) from None
+    name = chemistry.name or chemistry.mechanism
+    return Mechanism(name, tuple(species.values()), tuple(sites.values()), tuple(films.values()), tuple(surface),
+                     tuple(gas))
+
+
+def _elements(kind: str, name: str, table: SpeciesTable | SiteTable) -> dict[str, float]:
+    if table.elements is not None:
+        return dict(table.elements)
+    try:
+        return parse_formula(table.formula or name)
+    except ValueError as error:
+        raise reject(str(error), 'a formula, e.g. "Al(CH3)3", or elements = { Al = 1, C = 3, H = 9 }',
+                     key=f"chemistry.{kind}.{name}.formula") from None
+
+
+def _check_balance(
+    equation: str,
+    left: Mapping[str, float],
+    right: Mapping[str, float],
+    known: Mapping[str, Species | Site],
+    sites: Mapping[str, Site],
+) -> None:
+    """Every element, and the number of sites, must be the same on both sides."""
+    change: dict[str, float] = {}
+    for sign, side in ((-1.0, left), (1.0, right)):
+        for name, count in side.items():
+            for element, atoms in known[name].elements.items():
+                change[element] = change.get(element, 0.0) + sign * count * atoms
+    wrong = {element: value for element, value in change.items() if abs(value) > 1e-9}
+    if wrong:
+        text = ", ".join(f"{value:+g} {element}" for element, value in wrong.items())
+        raise reject(f"{equation!r}, which is off by {text}", "an equation that balances every element")
+    lost = sum(left.get(name, 0.0) - right.get(name, 0.0) for name in sites)
+    if abs(lost) > 1e-9:
+        raise reject(f"{equation!r}, which loses {lost:g} sites", "an equation that keeps the number of sites")
+
+
+def _surface_reaction(
+    key: str,
+    table: ReactionTable,
+    left: Mapping[str, float],
+    right: Mapping[str, float],
+    species: Mapping[str, Species],
+    sites: Mapping[str, Site],
+    films: Mapping[str, Site],
+) -> SurfaceReaction:
+    gases = [name for name in left if name in species]
+    states = [name for name in left if name in sites]
+    if len(gases) != 1 or len(states) != 1 or len(left) != 2:
+        raise reject(repr(table.equation), "a surface reaction that consumes one gas species and one site")
+    net = {name: right.get(name, 0.0) - left.get(name, 0.0) for name in dict.fromkeys((*left, *right))}
+    if not net[states[0]]:
+        raise reject(repr(table.equation), "a surface reaction that changes the state of its site")
+    if (table.sticking is None) == (table.A is None):
+        raise reject("both sticking and A" if table.A else "neither sticking nor A", "one of sticking and A",
+                     key="sticking")
+    A = 0.0
+    if table.A is not None:
+        try:
+            A = parse(table.A, "m/s")
+        except ValueError:
+            raise reject(repr(table.A), _SURFACE_RATE.accepted, key="A") from None
+    return SurfaceReaction(
+        key, write_equation(left, right), A, table.b, table.Ea, table.reference_temperature, gases[0], states[0],
+        {name: value for name, value in net.items() if name in species and value},
+        {name: value for name, value in net.items() if name in sites and value},
+        {name: value for name, value in net.items() if name in films and value},
+        table.sticking,
+    )
+
+
+def _gas_reaction(
+    key: str,
+    table: ReactionTable,
+    left: Mapping[str, float],
+    right: Mapping[str, float],
+    species: Mapping[str, Species],
+) -> GasReaction:
+    if len(left) != 2 or any(name not in species for name in (*left, *right)):
+        raise reject(repr(table.equation), "a gas reaction of two different species into gas species")
+    if table.sticking is not None or table.A is None:
+        raise reject("sticking" if table.sticking is not None else "no A", _GAS_RATE.accepted, key="A")
+    try:
+        A = parse(table.A, "m^3/mol/s")
+    except ValueError:
+        raise reject(repr(table.A), _GAS_RATE.accepted, key="A") from None
+    net = {name: right.get(name, 0.0) - left.get(name, 0.0) for name in dict.fromkeys((*left, *right))}
+    return GasReaction(
+        key, write_equation(left, right), A, table.b, table.Ea, table.reference_temperature,
+        dict.fromkeys(left, 1), {name: value for name, value in net.items() if value},
+    )

@@ -1,0 +1,104 @@
+"""Turns the first error that pydantic found into mpm's one line: file, key, what was found, what is accepted."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Sequence
+from typing import Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from mpm.errors import InputError
+from mpm.units import Dimension, describe
+
+_LATER = {"missing": 1}  # a misspelt key is both unknown and missing: say the former
+
+
+def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, source: str) -> InputError:
+    """Return the InputError for the first thing that is wrong with `data`, read as `model` from `source`."""
+    first = min(error.errors(include_url=False), key=lambda e: _LATER.get(e["type"], 0))
+    kind, context = first["type"], first.get("ctx") or {}
+    location = first["loc"]
+    key = address(location, data)
+    if kind == "mpm":
+        key = ".".join(part for part in (key, context.get("key", "")) if part)
+        return InputError.at(source, key, context["found"], context["accepted"], known=context.get("known", ()),
+                             given=context.get("given", ""))
+    if kind == "extra_forbidden":
+        known = known_keys(model, location[:-1])
+        return InputError.at(source, key, "an unknown key", f"one of {', '.join(known)}", known=known,
+                             given=str(location[-1]))
+    if kind == "missing":
+        return InputError.at(source, key, "nothing", _expected(_field(model, location)), given="")
+    found = describe(first["input"])
+    if kind == "literal_error":
+        choices = [choice.strip("'") for choice in context["expected"].replace(" or ", ", ").split(", ")]
+        return InputError.at(source, key, found, ", ".join(choices), known=choices, given=str(first["input"]))
+    text = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    return InputError.at(source, key, found, _WORDS.get(kind, text), given="")
+
+
+_WORDS = {
+    "model_type": "a table",
+    "dict_type": "a table",
+    "string_type": "text in quotes",
+    "tuple_type": "a list of tables, [[...]]",
+    "bool_type": "true or false",
+    "int_type": "a whole number",
+    "too_short": "at least one entry",
+}
+
+
+def address(location: Sequence[int | str], data: Any) -> str:
+    """Dotted key of an entry; list entries appear under their name (or their number while they have none)."""
+    parts = []
+    for part in location:
+        inside = None
+        if isinstance(part, int):
+            inside = data[part] if isinstance(data, (list, tuple)) and part < len(data) else None
+            name = inside.get("name") if isinstance(inside, dict) else None
+            parts.append(name if isinstance(name, str) and name else str(part + 1))
+        elif part != "[key]":
+            inside = data.get(part) if isinstance(data, dict) else None
+            parts.append(part)
+        data = inside
+    return ".".join(parts)
+
+
+def known_keys(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
+    """Keys that the table at `location` may have."""
+    table = _model(model, location)
+    return [field.alias or name for name, field in table.model_fields.items()] if table else []
+
+
+def _model(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel] | None:
+    """The model class of the table at `location`, walking through fields, tuples and dictionaries of models."""
+    current: Any = model
+    for part in location:
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            field = _named_field(current, str(part))
+            current = field.annotation if field else None
+        else:
+            current = next((a for a in get_args(current) if a not in (str, Ellipsis, type(None))), None)
+        if get_origin(current) in (Union, types.UnionType):
+            current = next((a for a in get_args(current) if a is not type(None)), None)
+    return current if isinstance(current, type) and issubclass(current, BaseModel) else None
+
+
+def _named_field(model: type[BaseModel], key: str) -> FieldInfo | None:
+    return next((f for name, f in model.model_fields.items() if (f.alias or name) == key), None)
+
+
+def _field(model: type[BaseModel], location: Sequence[int | str]) -> FieldInfo | None:
+    table = _model(model, location[:-1])
+    return _named_field(table, str(location[-1])) if table else None
+
+
+def _expected(field: FieldInfo | None) -> str:
+    for item in field.metadata if field else ():
+        if isinstance(item, Dimension):
+            return item.accepted
+    if field is not None and get_origin(field.annotation) is tuple:
+        return "a list of tables, [[...]]"
+    return (field.description if field else None) or ("a whole number" if field and field.annotation is int else "a value")

@@ -1,0 +1,202 @@
+"""Units are converted here, once, when a case is read; everything behind this door is an SI float.
+
+`Dimension` is the type annotation of a quantity in a case file. It reads `"3.5 cm/s"`, checks dimension and
+range, hands on 0.035, and writes `"0.035 m/s"` when the case is dumped. Conversion runs in decimal arithmetic,
+so that "139.7 mm" becomes the float 0.1397 and not its neighbour.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache, lru_cache
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)(?![A-Za-z0-9_.])\s*(.*?)\s*$")
+_JOINED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*?)\s*$")
+_ANGLES = {"radian", "degree", "turn", "arcminute", "arcsecond", "revolutions_per_minute", "grade"}
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal, cache_folder=None)
+
+
+def reject(found: str, accepted: str, **context: Any) -> PydanticCustomError:
+    """Build the error that a validator raises: what was found, what is accepted, and optional context.
+
+    `key` extends the address of the offending entry; `given` and `known` (a list) let the message suggest the
+    nearest name. The case reader turns it into an InputError.
+    """
+    return PydanticCustomError(
+        "mpm", "found {found}; accepted: {accepted}", {"found": found, "accepted": accepted, **context}
+    )
+
+
+@lru_cache(maxsize=4096)
+def parse(text: str, unit: str) -> float:
+    """Convert a number with its unit, such as `"3.5 cm/s"`, to the float that counts `unit`.
+
+    Raises ValueError with a short reason: no number, no unit, unknown unit, another dimension.
+    """
+    match = _NUMBER.match(text) or _JOINED.match(text)
+    if match is None:
+        raise ValueError("no number with a unit")
+    number, symbol = match.groups()
+    if not symbol:
+        raise ValueError("no unit")
+    registry = _registry()
+    try:
+        given = registry.Unit(symbol)
+    except Exception as error:  # pint raises many types here, down to tokenizer errors
+        raise ValueError(f"unknown unit {symbol!r}") from error
+    wanted = registry.Unit(unit)
+    if given.dimensionality != wanted.dimensionality or _counts_angle(given) != _counts_angle(wanted):
+        raise ValueError(f"{_dimension_text(given)}")
+    if "inf" in number or "nan" in number:
+        return float(number)
+    if given == registry.degree:
+        return math.radians(float(number))  # the float next to the true value; decimals of pi would miss it
+    return float(registry.Quantity(Decimal(number), given).to(wanted).magnitude)
+
+
+def _counts_angle(unit: Any) -> bool:
+    """Pint calls an angle dimensionless; here "60" is not an angle and "960 rpm" is not a frequency."""
+    return any(name.rpartition("_")[2] in _ANGLES or name in _ANGLES for name in unit._units)
+
+
+def _dimension_text(unit: Any) -> str:
+    if _counts_angle(unit):
+        return "an angle or angular velocity"
+    return f"dimension {unit.dimensionality}"
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """Annotation of one kind of quantity: `Annotated[float, Dimension("m/s", "a velocity", "3.5 cm/s")]`.
+
+    unit: what the float counts ("" for a pure number, which is then written without a unit);
+    above, at_least, at_most, below: range, in `unit`; infinite: whether "inf s" is legal.
+    """
+
+    unit: str
+    what: str
+    example: str
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    below: float | None = None
+    infinite: bool = False
+
+    def read(self, value: Any) -> float:
+        """Return the SI float for what stands in the case file, or raise `reject(...)`."""
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise reject(describe(value), self.accepted)
+        if self.unit:
+            if not isinstance(value, str):
+                raise reject(f"{value!r} without a unit", self.accepted)
+            try:
+                number = parse(value, self.unit)
+            except ValueError as error:
+                raise reject(f"{value!r} ({error})", self.accepted) from None
+        else:
+            if isinstance(value, str):
+                raise reject(f"{value!r}", self.accepted)
+            number = float(value)
+        finite = math.isfinite(number) or (self.infinite and number == math.inf)
+        inside = (
+            (self.above is None or number > self.above)
+            and (self.at_least is None or number >= self.at_least)
+            and (self.at_most is None or number <= self.at_most)
+            and (self.below is None or number < self.below)
+        )
+        if not (finite and inside):
+            raise reject(describe(value), self.accepted)
+        return number
+
+    def write(self, number: float) -> float | str:
+        """Return what a case file holds for this float; reading it gives the same float again."""
+        return f"{number!r} {self.unit}" if self.unit else number
+
+    @property
+    def accepted(self) -> str:
+        """What may stand there, in words, with an example."""
+        bounds = [
+            f"{word} {limit:g} {self.unit}".strip()
+            for word, limit in (
+                ("above", self.above),
+                ("from", self.at_least),
+                ("up to", self.at_most),
+                ("below", self.below),
+            )
+            if limit is not None
+        ]
+        kind = " ".join([self.what, " and ".join(bounds)]).strip()
+        return f'{kind} with its unit, e.g. "{self.example}"' if self.unit else f"{kind}, e.g. {self.example}"
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            self.read,
+            serialization=core_schema.plain_serializer_function_ser_schema(self.write, when_used="json"),
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        if self.unit:
+            return {
+                "type": "string",
+                "description": f"{self.accepted}; SI unit {self.unit}",
+                "examples": [self.example],
+                "pattern": r"^\s*[+-]?([0-9]|\.[0-9]|inf).*[^0-9.\s]\S*\s*$",
+            }
+        bounds = {
+            "exclusiveMinimum": self.above,
+            "minimum": self.at_least,
+            "maximum": self.at_most,
+            "exclusiveMaximum": self.below,
+        }
+        return {"type": "number", "description": self.accepted, **{k: v for k, v in bounds.items() if v is not None}}
+
+
+def describe(value: Any) -> str:
+    """Return what was found as short text for an error message."""
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, (list, tuple)):
+        return f"a list of {len(value)}"
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+Length = Annotated[float, Dimension("m", "a length", "3 mm", above=0.0)]
+Position = Annotated[float, Dimension("m", "a position", "104.8 mm", at_least=0.0)]
+Area = Annotated[float, Dimension("m^2", "a permeability", "4.25 um^2", above=0.0)]
+PerLength = Annotated[float, Dimension("1/m", "a surface per volume", "58000 1/m", at_least=0.0)]
+Speed = Annotated[float, Dimension("m/s", "a speed", "3.5 cm/s", at_least=0.0)]
+Velocity = Annotated[float, Dimension("m/s", "a velocity", "-0.40 cm/s")]
+Duration = Annotated[float, Dimension("s", "a time", "10 ms", above=0.0)]
+Instant = Annotated[float, Dimension("s", "a time", "50 ms", at_least=0.0)]
+Deadline = Annotated[float, Dimension("s", "a time", "5 s", above=0.0, infinite=True)]
+Frequency = Annotated[float, Dimension("Hz", "a frequency", "16 Hz", above=0.0)]
+Angle = Annotated[float, Dimension("rad", "an angle", "60 deg")]
+Temperature = Annotated[float, Dimension("K", "a temperature", "473 K", above=0.0)]
+Pressure = Annotated[float, Dimension("Pa", "a pressure", "101325 Pa", above=0.0)]
+Density = Annotated[float, Dimension("kg/m^3", "a density", "2500 kg/m^3", above=0.0)]
+Viscosity = Annotated[float, Dimension("Pa*s", "a viscosity", "1.72e-5 Pa s", above=0.0)]
+Diffusivity = Annotated[float, Dimension("m^2/s", "a diffusivity", "2.88e-5 m^2/s", at_least=0.0)]
+MolarMass = Annotated[float, Dimension("kg/mol", "a molar mass", "28.01 g/mol", above=0.0)]
+MolarEnergy = Annotated[float, Dimension("J/mol", "an activation energy", "20 kJ/mol")]
+SiteDensity = Annotated[float, Dimension("mol/m^2", "a site density", "6.92e-8 mol/m^2", above=0.0)]
+HeatCapacity = Annotated[float, Dimension("J/kg/K", "a heat capacity", "871 J/kg/K", above=0.0)]
+Conductivity = Annotated[float, Dimension("W/m/K", "a thermal conductivity", "1.3 W/m/K", above=0.0)]
+Number = Annotated[float, Dimension("", "a number", "0.5")]
+Positive = Annotated[float, Dimension("", "a number", "1.5", above=0.0)]
+NonNegative = Annotated[float, Dimension("", "a number", "0.30", at_least=0.0)]
+Fraction = Annotated[float, Dimension("", "a fraction", "2e-4", at_least=0.0, at_most=1.0)]
+Porosity = Annotated[float, Dimension("", "a fraction", "0.46", above=0.0, below=1.0)]
