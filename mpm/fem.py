@@ -14,7 +14,7 @@ except ModuleNotFoundError:
     pass
 
 try:
-    import dolfinx
+    import dolfinx.fem.petsc
     from petsc4py import PETSc
 except ModuleNotFoundError as missing:
     raise MpmError(

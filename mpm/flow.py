@@ -235,7 +235,7 @@ class FlowProblem:
         self._convection_form = convection(velocity, v, m)
         self._convection = dolfinx.fem.form(self._convection_form)
         self._jacobian_form = stokes + ufl.derivative(self._convection_form, self.state)
-        # a function's own vector, so that ghost values are at hand after a solve
+        self._force = _vector(self._convection)
         self.vector = self.state.x.petsc_vec
         self._rhs, self._work, self._fix = (self.steady_matrix.createVecLeft() for _ in range(3))
         own = self.space.dofmap.index_map.size_local
@@ -258,9 +258,8 @@ class FlowProblem:
         return self.inflow + frame_velocity_y * self.frame_inflow
 
     def convective_force(self) -> PETSc.Vec:
-        """N(u) of the present state as an assembled vector; a new vector."""
-        force = self._rhs.duplicate()
-        force.set(0.0)
+        """N(u) of the present state; the same vector at every call."""
+        force = self._force
         with force.localForm() as local:
             local.set(0.0)
         dolfinx.fem.petsc.assemble_vector(force, self._convection)

@@ -1,0 +1,380 @@
+"""Species in the gas and coverage of the solids over one time step, solved together.
+
+    eps dC_i/dt + div(u C_i - D_i^eff grad C_i) = eps R_i^gas + S sum_r nu_ir r_r
+
+Backward Euler on the fluxes of `mpm.fluxes`. The coverage is eliminated cell by cell (`mpm.kinetics`), because a site lives for
+microseconds and must never be split from the transport that feeds it; Newton's method then works on the concentrations of the reacting
+species alone. Species that are only made follow afterwards, one linear system each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.bed import Bed
+from mpm.chemistry import inlet_concentrations
+from mpm.errors import ConvergenceError
+from mpm.fem import PETSc
+from mpm.flow import FaceFlow
+from mpm.fluxes import FluxAssembler, FluxOperator
+from mpm.kinetics import GasKinetics, Roles, SurfaceKinetics
+from mpm.parallel import largest, total
+from mpm.solvers import DirectSolver, KrylovSolver
+from mpm.strip import Strip
+
+if TYPE_CHECKING:
+    from mpm.case import Case, Inlet
+
+Floats = NDArray[np.float64]
+NEWTON_LIMIT = 30
+RESIDUAL = 1e-11  # sum of |residual| over all cells, relative to the largest feed
+UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
+FORCING = 1e-2  # inner tolerance of the inexact Newton iteration
+HALVINGS = 6
+
+
+class CellMatrix:
+    """A PETSc matrix over own cells with `b` unknowns per cell: face fluxes off the diagonal, dense blocks on it."""
+
+    def __init__(self, strip: Strip, b: int):
+        faces, own = strip.faces, strip.owned
+        number = strip.global_cell
+        self.b, self.own = b, own
+        self.from_behind, self.from_ahead = np.flatnonzero(faces.behind < own), np.flatnonzero(faces.ahead < own)
+        rows_behind, rows_ahead = faces.behind[self.from_behind], faces.ahead[self.from_ahead]
+        to_ahead, to_behind = faces.ahead[self.from_behind], faces.behind[self.from_ahead]
+        i, j = np.divmod(np.arange(b * b), b)
+        block_rows = (number[:own, None] * b + i).ravel()
+        block_columns = (number[:own, None] * b + j).ravel()
+        rows = [number[rows_behind] * b + k for k in range(b)] + [number[rows_ahead] * b + k for k in range(b)]
+        columns = [number[to_ahead] * b + k for k in range(b)] + [number[to_behind] * b + k for k in range(b)]
+        self.matrix = PETSc.Mat().create(strip.comm)
+        self.matrix.setSizes(((own * b, None), (own * b, None)))
+        self.matrix.setType("aij")
+        self.matrix.setPreallocationCOO(
+            np.concatenate([*rows, block_rows]).astype(PETSc.IntType),
+            np.concatenate([*columns, block_columns]).astype(PETSc.IntType),
+        )
+        self.count = b * (len(rows_behind) + len(rows_ahead))
+        self.values = np.zeros(self.count + own * b * b)
+        self._diagonal_faces = (rows_behind, rows_ahead)
+
+    def set_fluxes(self, operators: list[FluxOperator]) -> Floats:
+        """Enter the face fluxes of one operator per unknown; returns what they add to the diagonal, (b, own) [m2/s]."""
+        behind, ahead = self.from_behind, self.from_ahead
+        diagonals = {}
+        for op in operators:
+            if id(op) not in diagonals:
+                diagonal = np.bincount(self._diagonal_faces[0], op.a[behind], self.own)
+                diagonal += np.bincount(self._diagonal_faces[1], op.b[ahead], self.own)
+                for port in (*op.inlets.values(), *op.outlets.values()):
+                    np.add.at(diagonal, port.cells, port.out)
+                diagonals[id(op)] = diagonal
+        self.values[: self.count] = np.concatenate(
+            [-op.b[behind] for op in operators] + [-op.a[ahead] for op in operators]
+        )
+        return np.stack([diagonals[id(op)] for op in operators])
+
+    def assemble(self, blocks: Floats) -> None:
+        """Set the diagonal blocks (own, b, b) and assemble."""
+        self.values[self.count :] = blocks.ravel()
+        self.matrix.setValuesCOO(self.values)
+
+
+@dataclass
+class Ledger:
+    """What has passed so far, per metre of depth; this rank's part.
+
+    Amounts [mol/m] per species of the run: `fed` (inlets, species) net of what diffuses or flows back out of the port, `out`, `back`
+    (outlets, species); volumes [m2] `out_volume`, `back_volume` (outlets,); events [mol/m] of each surface reaction in each reactive cell
+    and of each gas reaction in each own cell.
+    """
+
+    fed: Floats
+    out: Floats
+    back: Floats
+    out_volume: Floats
+    back_volume: Floats
+    surface_events: Floats
+    gas_events: Floats
+
+
+class Transport:
+    """Concentrations of all species that can appear, and the solvers that advance them.
+
+    `names` are those species, `concentration` (species, own cells) [mol/m3]. Operators for the velocity fields of a run are made with
+    `add_flow`; `advance` takes one step with one of them.
+    """
+
+    def __init__(self, case: Case, strip: Strip, bed: Bed, dispersion: tuple[Floats, Floats] | None = None):
+        self.case, self.strip, self.bed = case, strip, bed
+        mechanism = case.mechanism
+        self.feed = {
+            inlet.name: inlet_concentrations(mechanism, case.gas, inlet.mass_fractions) for inlet in case.geometry.inlets
+        }
+        fed = {name for amounts in self.feed.values() for name, c in amounts.items() if c > 0.0}
+        self.roles = Roles.of(mechanism, fed)
+        self.names = (*self.roles.coupled, *self.roles.products)
+        temperature = case.gas.temperature
+        self.surface = SurfaceKinetics(mechanism, self.roles.coupled, bed.surface, bed.sites, temperature)
+        self.gas = GasKinetics(mechanism, self.roles.coupled, temperature)
+        self._stoichiometry()
+        own = strip.owned
+        porosity = [m.porosity if (m := case.geometry.layers[i].material) else 1.0 for i in strip.grid.row_layer]
+        self.porosity = np.asarray(porosity)[strip.row[:own]]
+        self.volume = strip.volume[:own]
+        self.gas_volume = self.porosity * self.volume
+        self.active_area = bed.surface * self.volume[bed.cells]  # reactive area per cell [m2/m]
+        self.concentration = np.zeros((len(self.names), own))
+        inlets, outlets = len(case.geometry.inlets), len(case.geometry.outlets)
+        n = len(self.names)
+        self.ledger = Ledger(
+            np.zeros((inlets, n)),
+            np.zeros((outlets, n)),
+            np.zeros((outlets, n)),
+            np.zeros(outlets),
+            np.zeros(outlets),
+            np.zeros((len(self.surface.reactions), len(bed.cells))),
+            np.zeros((len(self.gas.reactions), own)),
+        )
+        self.largest_feed = max((c for f in self.feed.values() for c in f.values()), default=0.0)
+        self.feed_rate = max(
+            (abs(i.velocity) * i.width * max(self.feed[i.name].values(), default=0.0) for i in case.geometry.inlets), default=0.0
+        )
+        diffusivities = [case.gas.diffusivity[name] for name in self.names]
+        self._distinct = sorted(set(diffusivities))
+        self._group = [self._distinct.index(d) for d in diffusivities]
+        self._assemblers = [FluxAssembler(case, strip, d, dispersion) for d in self._distinct]
+        self._flows: list[list[FluxOperator]] = []
+        self._linear = [_StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s") for d in self._distinct]
+        self._factored: dict[tuple[int, int, float], _StepMatrix] = {}
+        self.direct_limit = 4  # velocity fields up to which the linear species keep one LU factor each
+        if self.roles.coupled:
+            self._jacobian = CellMatrix(strip, len(self.roles.coupled))
+            self._newton = KrylovSolver(self._jacobian.matrix, "reacting species", FORCING)
+            self._step, self._rhs = self._jacobian.matrix.createVecs()
+        self.iterations = 0
+
+    def _stoichiometry(self) -> None:
+        """Signed gas stoichiometry of the running reactions, (reactions, species of the run)."""
+        self.nu_surface = np.array(
+            [[r.nu_gas.get(n, 0.0) for n in self.names] for r in self.surface.reactions]
+        ).reshape(-1, len(self.names))
+        self.nu_gas = np.array([[r.nu.get(n, 0.0) for n in self.names] for r in self.gas.reactions]).reshape(
+            -1, len(self.names)
+        )
+
+    def add_flow(self, flow: FaceFlow) -> int:
+        """Make the operators of a velocity field; returns its number."""
+        self._flows.append([assembler.operator(flow) for assembler in self._assemblers])
+        return len(self._flows) - 1
+
+    def replace_flow(self, number: int, flow: FaceFlow) -> None:
+        """Put another velocity field in the place of `number`."""
+        self._flows[number] = [assembler.operator(flow) for assembler in self._assemblers]
+        for linear in self._linear:
+            linear.key = None
+        for key in [key for key in self._factored if key[1] == number]:
+            del self._factored[key]
+
+    # --- one step ---
+
+    def advance(self, number: int, t0: float, t1: float, halvings: int = 0) -> None:
+        """Advance concentrations, coverage and ledger from `t0` to `t1` [s] with velocity field `number`.
+
+        A step whose Newton iteration fails is halved, up to HALVINGS times. Raises ConvergenceError after that.
+        """
+        before = self.concentration.copy()
+        try:
+            self._advance(number, t0, t1)
+        except ConvergenceError as error:
+            self.concentration = before
+            if halvings == HALVINGS:
+                raise ConvergenceError(f"t = {t0:.6g} s, step of {t1 - t0:.3g} s: {error}") from error
+            middle = 0.5 * (t0 + t1)
+            self.advance(number, t0, middle, halvings + 1)
+            self.advance(number, middle, t1, halvings + 1)
+
+    def _advance(self, number: int, t0: float, t1: float) -> None:
+        dt = t1 - t0
+        operators = [self._flows[number][group] for group in self._group]
+        old, coupled = self.concentration, len(self.roles.coupled)
+        drawn = self._outlet_means(operators[0]) if self.names and operators[0].drawn_in else {}
+        supply = self._supply(operators, t0, t1, drawn)
+        new = old.copy()
+        theta = self.bed.theta
+        if coupled:
+            new[:coupled], rates, gas_rates = self._solve_coupled(number, dt, old[:coupled], supply[:coupled], theta)
+            self.bed.theta = self.surface.coverage(new[:coupled][:, self.bed.cells], theta, dt)
+        else:
+            rates = np.zeros((len(self.surface.reactions), len(self.bed.cells)))
+            gas_rates = np.zeros((len(self.gas.reactions), self.strip.owned))
+        events = rates * self.active_area * dt
+        gas_events = gas_rates * self.gas_volume * dt
+        for i in range(coupled, len(self.names)):
+            made = supply[i].copy()
+            made[self.bed.cells] += self.nu_surface[:, i] @ events / dt
+            made += self.nu_gas[:, i] @ gas_events / dt
+            new[i] = self._solve_linear(i, number, dt, old[i], made)
+        self.concentration = new
+        self._book(operators, dt, t0, t1, drawn, events, gas_events)
+
+    def _supply(self, operators: list[FluxOperator], t0: float, t1: float, drawn: dict[str, Floats]) -> Floats:
+        """What enters each cell through ports, (species, own) [mol/m/s]."""
+        supply = np.zeros_like(self.concentration)
+        for inlet in self.case.geometry.inlets:
+            share = open_share(inlet, t0, t1)
+            for i, name in enumerate(self.names):
+                c = self.feed[inlet.name].get(name, 0.0) * share
+                if c > 0.0:
+                    port = operators[i].inlets[inlet.name]
+                    supply[i, port.cells] += port.into * c
+        for name, means in drawn.items():
+            port = operators[0].outlets[name]
+            supply[:, port.cells] += port.into * means[:, None]
+        return supply
+
+    def _outlet_means(self, operator: FluxOperator) -> dict[str, Floats]:
+        """Area mean of the cells next to each outlet, (species,) [mol/m3]; collective."""
+        sums = []
+        for port in operator.outlets.values():
+            sums.append([*(self.concentration[:, port.cells] @ port.area), port.area.sum()])
+        sums = total(self.strip.comm, sums)
+        return {name: row[:-1] / row[-1] for name, row in zip(operator.outlets, sums, strict=True)}
+
+    def _matrix(self, group: int, number: int, dt: float) -> _StepMatrix:
+        """The linear operator gas_volume/dt + fluxes of a species group, up to date for this flow and step."""
+        linear = self._linear[group]
+        if linear.key != (number, dt):
+            linear.update(self._flows[number][group], dt)
+            linear.key = (number, dt)
+        return linear
+
+    def _solve_linear(self, i: int, number: int, dt: float, old: Floats, supply: Floats) -> Floats:
+        group = self._group[i]
+        rhs = self.gas_volume * old / dt + supply
+        if len(self._flows) > self.direct_limit:
+            return self._matrix(group, number, dt).solve(rhs, old, self.feed_rate * RESIDUAL)
+        key = (group, number, dt)
+        if key not in self._factored:
+            factored = _StepMatrix(self.strip, self.gas_volume, self._linear[group].name)
+            factored.update(self._flows[number][group], dt)
+            if len(self._factored) > 2 * self.direct_limit:
+                self._factored.clear()
+            self._factored[key] = factored
+        return self._factored[key].solve_directly(rhs)
+
+    def _solve_coupled(
+        self, number: int, dt: float, old: Floats, supply: Floats, theta: Floats
+    ) -> tuple[Floats, Floats, Floats]:
+        """Inexact Newton on the reacting species; returns concentrations, surface rates, gas rates at the end of the step."""
+        b, own = old.shape
+        groups = self._group[:b]
+        matrices = [self._matrix(group, number, dt) for group in groups]
+        diagonal = self._jacobian.set_fluxes([self._flows[number][group] for group in groups])
+        diagonal += self.gas_volume / dt
+        rhs = self.gas_volume * old / dt + supply
+        new = old.copy()
+        cells = self.bed.cells
+        scale = max(self.feed_rate, 1e-300)
+        for _iteration in range(NEWTON_LIMIT):
+            rates, slopes = self.surface.rates(new[:, cells], theta, dt)
+            gas_rates, gas_slopes = self.gas.rates(new)
+            source = (self.nu_gas[:, :b].T @ gas_rates) * self.gas_volume
+            source[:, cells] += (self.nu_surface[:, :b].T @ rates) * self.active_area
+            residual = np.stack([m.multiply(c) for m, c in zip(matrices, new, strict=True)]) - rhs - source
+            worst = total(self.strip.comm, [np.abs(residual).sum()])[0] / scale
+            low = -largest(self.strip.comm, [-new.min(initial=0.0)])[0]
+            if worst < RESIDUAL and low >= -UNDERSHOOT * self.largest_feed:
+                return new, rates, gas_rates
+            if not np.isfinite(worst):
+                break
+            blocks = np.einsum("ri,rjn->nij", self.nu_gas[:, :b], gas_slopes) * -self.gas_volume[:, None, None]
+            blocks[cells] -= np.einsum("ri,rjn->nij", self.nu_surface[:, :b], slopes) * self.active_area[:, None, None]
+            for i in range(b):
+                blocks[:, i, i] += diagonal[i]
+            self._jacobian.assemble(blocks)
+            self._rhs.array[:] = residual.T.ravel()
+            self.iterations += self._newton.solve(self._rhs, self._step)
+            new = new - self._step.array.reshape(own, b).T
+        raise ConvergenceError(
+            f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
+            f"{worst:.3g} of the feed, lowest concentration {low:.3g} mol/m3"
+        )
+
+    def _book(
+        self,
+        operators: list[FluxOperator],
+        dt: float,
+        t0: float,
+        t1: float,
+        drawn: dict[str, Floats],
+        events: Floats,
+        gas_events: Floats,
+    ) -> None:
+        """Enter the step into the ledger."""
+        ledger = self.ledger
+        ledger.surface_events += events
+        ledger.gas_events += gas_events
+        for i in range(len(self.names)):
+            c = self.concentration[i]
+            for k, inlet in enumerate(self.case.geometry.inlets):
+                port = operators[i].inlets[inlet.name]
+                inside = self.feed[inlet.name].get(self.names[i], 0.0) * open_share(inlet, t0, t1)
+                ledger.fed[k, i] += dt * (port.into.sum() * inside - port.out @ c[port.cells])
+            for k, (name, port) in enumerate(operators[i].outlets.items()):
+                ledger.out[k, i] += dt * (port.out @ c[port.cells])
+                if name in drawn:
+                    ledger.back[k, i] += dt * port.into.sum() * drawn[name][i]
+        if operators:
+            for k, port in enumerate(operators[0].outlets.values()):
+                ledger.out_volume[k] += dt * port.volume_out.sum()
+                ledger.back_volume[k] += dt * port.into.sum()
+
+
+class _StepMatrix:
+    """gas_volume/dt + fluxes for one species, with the solvers that go with it."""
+
+    def __init__(self, strip: Strip, gas_volume: Floats, name: str):
+        self.cells = CellMatrix(strip, 1)
+        self.gas_volume, self.name = gas_volume, name
+        self.key: tuple[int, float] | None = None
+        self.krylov: KrylovSolver | None = None
+        self.direct: DirectSolver | None = None
+        self.x, self.y = self.cells.matrix.createVecs()
+
+    def update(self, operator: FluxOperator, dt: float) -> None:
+        diagonal = self.cells.set_fluxes([operator])[0] + self.gas_volume / dt
+        self.cells.assemble(diagonal)
+
+    def multiply(self, values: Floats) -> Floats:
+        self.x.array[:] = values
+        self.cells.matrix.mult(self.x, self.y)
+        return self.y.array.copy()
+
+    def solve(self, rhs: Floats, guess: Floats, residual: float) -> Floats:
+        """BiCGStab from `guess` until the residual norm is below `residual` [mol/m/s]."""
+        if self.krylov is None:
+            self.krylov = KrylovSolver(self.cells.matrix, self.name, 0.0)
+            self.krylov.ksp.setTolerances(rtol=1e-13, atol=residual / np.sqrt(max(self.cells.matrix.size[0], 1)))
+        self.y.array[:] = rhs
+        self.x.array[:] = guess
+        self.krylov.solve(self.y, self.x, guess=True)
+        return self.x.array.copy()
+
+    def solve_directly(self, rhs: Floats) -> Floats:
+        if self.direct is None:
+            self.direct = DirectSolver(self.cells.matrix, self.name)
+        self.y.array[:] = rhs
+        self.direct.solve(self.y, self.x)
+        return self.x.array.copy()
+
+
+def open_share(inlet: Inlet, t0: float, t1: float) -> float:
+    """Share of the step from `t0` to `t1` during which the inlet doses."""
+    dosing = sum(max(min(stop, t1) - max(start, t0), 0.0) for start, stop in inlet.windows)
+    return dosing / (t1 - t0)
