@@ -1,0 +1,143 @@
+"""The state of a sweep as its files tell it: a verdict and a summary per point, the table, the provenance."""
+
+import contextlib
+import json
+import platform
+from collections import Counter
+from collections.abc import Mapping, Sequence, Set
+from importlib import metadata
+from typing import Any
+
+from mpm.files import write_atomically
+from mpm.sweep.layout import Layout, read_json
+from mpm.sweep.plan import Point
+from mpm.sweep.point import error_of, program, status_of
+from mpm.sweep.quantities import to_number
+from mpm.sweep.sweepfile import Sweep
+from mpm.sweep.table import Row, choose, flatten, unit_of, write_csv, write_parquet
+
+PACKAGES = (
+    "mpm",
+    "numpy",
+    "scipy",
+    "dolfinx-solver-real",
+    "fenics-dolfinx",
+    "mpi4py",
+    "distributed",
+    "dask-jobqueue",
+)
+
+
+class Results:
+    """The table of a sweep, kept up to date from the points' own files."""
+
+    def __init__(self, sweep: Sweep, points: Sequence[Point], layout: Layout) -> None:
+        self.sweep = sweep
+        self.points = points
+        self.layout = layout
+        self.records: dict[str, dict[str, Any]] = {}
+        self._numbers: dict[str, dict[str, float]] = {}
+        for point in points:
+            self.note(point.name, read_json(layout.record(point.name)))
+
+    def note(self, name: str, record: dict[str, Any]) -> None:
+        """Take over a point's verdict and, when it is done, its summary."""
+        self.records[name] = record
+        self._numbers.pop(name, None)
+        if self.status(name) == "done":
+            self._numbers[name] = flatten(read_json(self.layout.run(name) / "summary.json"))
+
+    def status(self, name: str) -> str:
+        """One word; `bad_input` also for points that the case refused before they could run."""
+        return status_of(self.records[name], self.layout.run(name))
+
+    def columns(self) -> dict[str, str]:
+        """Every column of the table with its SI unit ("" for words)."""
+        steady = self.sweep.base.fidelity == "steady"
+        available = [name for numbers in self._numbers.values() for name in numbers]
+        chosen = choose(self.sweep.columns, available)
+        axes = {axis.name: axis.si_unit for axis in self.sweep.axes}
+        numbers = {name: unit_of(name, steady) for name in chosen if name not in axes}
+        return {**axes, "status": "", **numbers, "error": "", "point": ""}
+
+    def rows(self) -> list[Row]:
+        """A row per point of the plan, in its order."""
+        rows = []
+        for point in self.points:
+            row: Row = dict(zip((axis.name for axis in self.sweep.axes), point.numbers, strict=True))
+            if point.case is None:
+                row |= {"status": "bad_input", "error": point.error, "point": point.name}
+            else:
+                error = error_of(self.records[point.name], self.layout, point.name)
+                row |= {"status": self.status(point.name), "error": error, "point": point.name}
+                row |= self._numbers.get(point.name, {})
+            rows.append(row)
+        return rows
+
+    def counts(self) -> Counter[str]:
+        """How many rows have which status."""
+        return Counter(str(row["status"]) for row in self.rows())
+
+    def settled(self, to_run: Set[str]) -> Counter[str]:
+        """How many different points outside `to_run` have which status."""
+        states = {str(row["point"]): str(row["status"]) for row in self.rows()}
+        return Counter(state for name, state in states.items() if name not in to_run)
+
+    def missing_columns(self) -> list[str]:
+        """Columns asked for by their full name that no finished point has."""
+        known = {name for numbers in self._numbers.values() for name in numbers}
+        return [name for name in choose(self.sweep.columns, ()) if known and name not in known]
+
+    def save(self, about: Mapping[str, Any]) -> bool:
+        """Write results.csv, sweep.json and results.parquet; False when pyarrow for the last is missing."""
+        rows, columns = self.rows(), self.columns()
+        write_csv(self.layout.root / "results.csv", columns, rows)
+        write_atomically(
+            self.layout.root / "sweep.json", json.dumps(provenance(self) | about, indent=1) + "\n"
+        )
+        return write_parquet(self.layout.root / "results.parquet", columns, rows, {"title": self.sweep.title})
+
+
+def provenance(results: Results) -> dict[str, Any]:
+    """Content of sweep.json: what was asked, of which program, and what came of every point."""
+    sweep = results.sweep
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            versions[package] = metadata.version(package)
+    axes = [
+        {
+            "name": axis.name,
+            "keys": axis.keys,
+            "unit": axis.si_unit,
+            "written_unit": axis.unit,
+            "kind": "word" if isinstance(results.points[0].numbers[index], str) else "number",
+            "logarithmic": axis.logarithmic,
+            "numbers": [to_number(level)[0] for level in axis.levels],
+        }
+        for index, axis in enumerate(sweep.axes)
+    ]
+    points = [
+        {
+            "point": point.name,
+            "levels": point.levels,
+            "status": row["status"],
+            **results.records.get(point.name, {}),
+        }
+        for point, row in zip(results.points, results.rows(), strict=True)
+    ]
+    return {
+        "title": sweep.title,
+        "file": str(sweep.path),
+        "text": sweep.text,
+        "case": sweep.case,
+        "base_hash": sweep.base.content_hash(),
+        "mode": sweep.mode,
+        "program": program(),
+        "versions": versions,
+        "host": platform.node(),
+        "counts": results.counts(),
+        "axes": axes,
+        "columns": {name: {"unit": unit} for name, unit in results.columns().items()},
+        "points": points,
+    }
