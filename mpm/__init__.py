@@ -8,6 +8,7 @@ Names are imported on first use, so that `import mpm` needs neither dolfinx nor 
 """
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -31,11 +32,12 @@ _HOME = {
     "Reactor": "mpm.reactor",
     "load_sweep": "mpm.sweep",
 }
-__all__ = sorted(_HOME)  # noqa: PLE0605
-__version__ = "0.1.0"
+__all__ = list(_HOME)
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version("mpm")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

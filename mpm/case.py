@@ -16,12 +16,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, Strict, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, Strict, ValidationError, WithJsonSchema, model_validator
 
 from mpm.caseio import assemble, built_in_files, find_file, read_toml, write_toml
 from mpm.chemistry import Mechanism
 from mpm.constants import GRAVITY
-from mpm.errors import InputError
 from mpm.gases import CARRIERS, ideal_gas_density
 from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
@@ -46,8 +45,31 @@ from mpm.units import (
 )
 
 __all__ = [
-    "Case", "Gas", "Geometry", "Inlet", "Layer", "Material", "Motion", "Outlet", "Output", "Time", "Transport", "Zone",
-    "case_schema", "load_case",
+    "Case",
+    "Gas",
+    "Geometry",
+    "Inlet",
+    "Layer",
+    "Material",
+    "Motion",
+    "Outlet",
+    "Output",
+    "Time",
+    "Transport",
+    "Zone",
+    "case_schema",
+    "load_case",
+]
+
+
+SpeciesDiffusivity = Annotated[
+    dict[str, Diffusivity],
+    WithJsonSchema(
+        {
+            "description": 'one value for all species, e.g. "2.88e-5 m^2/s", or a table of them (and of a default)',
+            "anyOf": [{"type": "string"}, {"type": "object", "additionalProperties": {"type": "string"}}],
+        }
+    ),
 ]
 
 
@@ -64,17 +86,19 @@ class Gas(Frozen):
     molar_mass: MolarMass = 0.0
     viscosity: Viscosity = 0.0
     density: Density = 0.0
-    diffusivity: Annotated[
-        dict[str, Diffusivity],
-        Field(json_schema_extra={"anyOf": [{"type": "string"}, {"type": "object"}], "type": None}),
-    ] = {}
+    diffusivity: SpeciesDiffusivity = Field({})
 
     @model_validator(mode="after")
     def _fill_in(self) -> Self:
         model, values, given = CARRIERS.get(self.carrier), self.__dict__, self.model_fields_set
         if model is None and not {"molar_mass", "viscosity"} <= given:
-            raise reject(repr(self.carrier), f"one of {', '.join(CARRIERS)}, or any name with molar_mass and viscosity",
-                         key="carrier", given=self.carrier, known=list(CARRIERS))
+            raise reject(
+                repr(self.carrier),
+                f"one of {', '.join(CARRIERS)}, or any name with molar_mass and viscosity",
+                key="carrier",
+                given=self.carrier,
+                known=list(CARRIERS),
+            )
         if "molar_mass" not in given and model is not None:
             values["molar_mass"] = model.molar_mass
         if "viscosity" not in given and model is not None:
@@ -117,21 +141,30 @@ class Motion(Frozen):
         low, high = (0.0, math.pi / 2.0)
         steep = self.angle <= low if self.angle_from == "horizontal" else self.angle >= high
         if not low <= self.angle <= high or steep:
-            raise reject(f"{math.degrees(self.angle):g} deg from the {self.angle_from}",
-                         "an angle from 0 deg to 90 deg that leaves a vertical component", key="angle")
+            raise reject(
+                f"{math.degrees(self.angle):g} deg from the {self.angle_from}",
+                "an angle from 0 deg to 90 deg that leaves a vertical component",
+                key="angle",
+            )
         if self.gamma == 0.0:
             return self
         if self.profile == "thesis":
             peak = self.peak_vertical_velocity
             if not -peak < self.liftoff_velocity < 0.0:
-                raise reject(f"{self.liftoff_velocity:g} m/s", f"between 0 m/s and the reactor's peak velocity, {-peak:.4g} m/s",
-                             key="liftoff_velocity")
+                raise reject(
+                    f"{self.liftoff_velocity:g} m/s",
+                    f"between 0 m/s and the reactor's peak velocity, {-peak:.4g} m/s",
+                    key="liftoff_velocity",
+                )
         elif self.profile == "phases":
             for key in ("liftoff_phase", "contact_phase"):
                 value = getattr(self, key)
                 if value is None or not 0.0 <= value < 2.0 * math.pi:
-                    raise reject("nothing" if value is None else f"{math.degrees(value):g} deg",
-                                 'an angle from 0 deg to below 360 deg, e.g. "97.85 deg", for profile = "phases"', key=key)
+                    raise reject(
+                        "nothing" if value is None else f"{math.degrees(value):g} deg",
+                        'an angle from 0 deg to below 360 deg, e.g. "97.85 deg", for profile = "phases"',
+                        key=key,
+                    )
             if self.liftoff_phase == self.contact_phase:
                 raise reject("the phase of lift-off", "another phase", key="contact_phase")
         else:
@@ -191,25 +224,41 @@ class Case(Frozen):
                 if 0.0 < inlet.velocity < peak:
                     raise reject(
                         f"lab, with {inlet.name} at {inlet.velocity:g} m/s and a reactor at up to {peak:.4g} m/s: the port flow "
-                        "reverses within a cycle", 'fidelity = "resolved", inlet_frame = "reactor", or a faster inlet',
-                        key="motion.inlet_frame")
+                        "reverses within a cycle",
+                        'fidelity = "resolved", inlet_frame = "reactor", or a faster inlet',
+                        key="motion.inlet_frame",
+                    )
         return self
 
     def _check_chemistry(self) -> None:
         species, sites = self._mechanism.species_names, self._mechanism.site_names
         if self.gas.carrier in species:
-            raise reject(f"carrier {self.gas.carrier!r}, a species of the mechanism", "a gas that takes no part",
-                         key="gas.carrier")
+            raise reject(
+                f"carrier {self.gas.carrier!r}, a species of the mechanism",
+                "a gas that takes no part",
+                key="gas.carrier",
+            )
         for place, names, known in (
-            *((f"geometry.inlet.{i.name}.mass_fractions", i.mass_fractions, species) for i in self.geometry.inlets),
-            *((f"material.{name}.initial_coverage", m.initial_coverage, sites) for name, m in self.materials.items()),
+            *(
+                (f"geometry.inlet.{i.name}.mass_fractions", i.mass_fractions, species)
+                for i in self.geometry.inlets
+            ),
+            *(
+                (f"material.{name}.initial_coverage", m.initial_coverage, sites)
+                for name, m in self.materials.items()
+            ),
             ("gas.diffusivity", self.gas.diffusivity, species),
         ):
             for name in names:
                 if name not in known:
                     kind = "site" if known is sites else "species"
-                    raise reject(f"a {kind} that the mechanism does not have", f"one of {', '.join(known)}",
-                                 key=f"{place}.{name}", given=name, known=list(known))
+                    raise reject(
+                        f"a {kind} that the mechanism does not have",
+                        f"one of {', '.join(known)}",
+                        key=f"{place}.{name}",
+                        given=name,
+                        known=list(known),
+                    )
 
     @property
     def mechanism(self) -> Mechanism:

@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import tomli_w
 
@@ -49,7 +49,9 @@ def read_toml(path: Path) -> Table:
 def built_in_files(folder: str) -> dict[str, Path]:
     """Names and paths of the files that come with mpm in `folder`: cases, meshes or mechanisms."""
     package = Path(__file__).parent
-    files = {path.stem: path for place in (package, package.parent) for path in (place / folder).glob("*.toml")}
+    files = {
+        path.stem: path for place in (package, package.parent) for path in (place / folder).glob("*.toml")
+    }
     return dict(sorted(files.items()))
 
 
@@ -60,14 +62,22 @@ def find_file(folder: str, name: str, near: Path, source: str, key: str) -> Path
         return built_in[name]
     path = near / name
     if not path.is_file():
-        raise InputError.at(source, key, f"{name!r}, no such file", f"a path, or one of {', '.join(built_in)}",
-                            given=name, known=built_in)
+        raise InputError.at(
+            source,
+            key,
+            f"{name!r}, no such file",
+            f"a path, or one of {', '.join(built_in)}",
+            given=name,
+            known=built_in,
+        )
     return path.resolve()
 
 
 def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:
     """Lay table `over` upon table `under`: tables merge by key, lists of named tables by name, all else is replaced."""
-    result = {key: value for key, value in under.items() if not any(key in _REPLACES.get(new, ()) for new in over)}
+    result = {
+        key: value for key, value in under.items() if not any(key in _REPLACES.get(new, ()) for new in over)
+    }
     for key, value in over.items():
         below = result.get(key)
         if isinstance(value, Mapping) and isinstance(below, Mapping):
@@ -79,15 +89,19 @@ def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:
     return result
 
 
-def _named(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) and "name" in v for v in value)
+def _named(value: Any) -> TypeGuard[list[Table]]:
+    return (
+        isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) and "name" in v for v in value)
+    )
 
 
 def _merge_lists(under: list[Table], over: list[Table]) -> list[Table]:
     result = [dict(entry) for entry in under]
     places = {entry["name"]: i for i, entry in enumerate(result)}
     for entry in over:
-        place = places.pop(entry["name"], None)  # a second entry of the same name is appended, and found out later
+        place = places.pop(
+            entry["name"], None
+        )  # a second entry of the same name is appended, and found out later
         if place is None:
             result.append(deepcopy(dict(entry)))
         else:
@@ -118,7 +132,9 @@ def set_key(data: Table, key: str, value: Any, source: str) -> None:
 def _entry(entries: list[Any], name: str, place: str, source: str) -> Any:
     named = {str(entry.get("name")): entry for entry in entries if isinstance(entry, dict)}
     if name not in named:
-        raise InputError.at(source, place, f"no entry named {name!r}", f"one of {', '.join(named)}", known=named)
+        raise InputError.at(
+            source, place, f"no entry named {name!r}", f"one of {', '.join(named)}", known=named
+        )
     return named[name]
 
 
@@ -132,11 +148,8 @@ def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path
     for key in ("geometry.base", "chemistry.mechanism"):  # these decide what the other keys refer to
         if key in overrides:
             set_key(result, key, overrides[key], source)
-    geometry = _table(result, "geometry")
-    if isinstance(geometry.get("base"), str):
-        path = find_file("meshes", geometry.pop("base"), folder, source, "geometry.base")
-        shared = read_toml(path)
-        result["geometry"] = merge(shared.get("geometry", {}), geometry)
+    if "geometry" in result:
+        result["geometry"] = _with_base(result["geometry"], folder, source)
     _insert_mechanism(result, folder, source)
     gas = result.setdefault("gas", {})
     if isinstance(gas, dict) and not isinstance(gas.get("diffusivity", {}), dict):
@@ -156,6 +169,17 @@ def _table(data: Mapping[str, Any], key: str) -> Table:
     return value if isinstance(value, dict) else {}
 
 
+def _with_base(geometry: Any, folder: Path, source: str, seen: tuple[Path, ...] = ()) -> Any:
+    """The geometry laid over the shared one that it names as its base, which may have a base itself."""
+    if not isinstance(geometry, dict) or not isinstance(geometry.get("base"), str):
+        return geometry
+    path = find_file("meshes", geometry["base"], folder, source, "geometry.base")
+    if path in seen:
+        raise InputError.at(source, "geometry.base", f"{path.name}, which leads back here", "another file")
+    shared = _with_base(read_toml(path).get("geometry", {}), path.parent, str(path), (*seen, path))
+    return merge(shared, {key: value for key, value in geometry.items() if key != "base"})
+
+
 def _insert_mechanism(data: Table, folder: Path, source: str) -> None:
     chemistry = data.setdefault("chemistry", {})
     name = chemistry.setdefault("mechanism", "alumina") if isinstance(chemistry, dict) else None
@@ -164,7 +188,9 @@ def _insert_mechanism(data: Table, folder: Path, source: str) -> None:
     path = find_file("mechanisms", name, folder, source, "chemistry.mechanism")
     data["chemistry"] = merge({"name": path.stem, **read_toml(path)}, chemistry)
     if path != built_in_files("mechanisms").get(name):
-        data["chemistry"]["mechanism"] = "inline"  # the tables are all here now: the case no longer needs the file
+        data["chemistry"]["mechanism"] = (
+            "inline"  # the tables are all here now: the case no longer needs the file
+        )
 
 
 def _insert_materials(data: Table, source: str) -> None:
@@ -178,8 +204,14 @@ def _insert_materials(data: Table, source: str) -> None:
             continue
         if name not in given and name not in BUILT_IN:
             known = [*given, *BUILT_IN]
-            raise InputError.at(source, f"geometry.layer.{layer.get('name', '?')}.material", repr(name),
-                                f"a table [material.{name}], or one of {', '.join(known)}", given=name, known=known)
+            raise InputError.at(
+                source,
+                f"geometry.layer.{layer.get('name', '?')}.material",
+                repr(name),
+                f"a table [material.{name}], or one of {', '.join(known)}",
+                given=name,
+                known=known,
+            )
         given.setdefault(name, {})
     sites = list(_table(_table(data, "chemistry"), "site"))
     for name, table in given.items():

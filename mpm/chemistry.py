@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+
 @dataclass(frozen=True)
 class Species:
     """A gas species: molar mass [kg/mol], atoms per molecule."""
@@ -79,7 +80,7 @@ class SurfaceReaction(_Reaction):
     sticking: float | None = None
 
     def rate_constant(self, temperature: ArrayLike, molar_mass: float) -> Floats:
-        """k [m/s], of the shape of `temperature`, at `temperature` [K]; `molar_mass` [kg/mol] is that of the gas it consumes (used with sticking).
+        """k [m/s] at `temperature` [K], in its shape; `molar_mass` [kg/mol] of the gas matters with sticking only.
 
         Kinetic theory: the flux onto a wall is C sqrt(R T/(2 pi M)), of which the share `sticking` reacts.
         """
@@ -154,7 +155,9 @@ def mole_fractions(
     return {name: amount / total for name, amount in amounts.items()}
 
 
-def inlet_concentrations(mechanism: Mechanism, gas: Gas, mass_fractions: Mapping[str, float]) -> dict[str, float]:
+def inlet_concentrations(
+    mechanism: Mechanism, gas: Gas, mass_fractions: Mapping[str, float]
+) -> dict[str, float]:
     """Concentrations C_i = x_i p/(R T) [mol/m3] of a feed, with the mixture's mole fractions (it need not be dilute)."""
     total = gas.pressure / (GAS_CONSTANT * gas.temperature)
     return {name: x * total for name, x in mole_fractions(mechanism, gas.molar_mass, mass_fractions).items()}

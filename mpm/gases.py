@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from mpm.constants import GAS_CONSTANT
 
+
 @dataclass(frozen=True)
 class CarrierGas:
     """Properties of a carrier gas: molar mass [kg/mol] and the constants of Sutherland's viscosity."""

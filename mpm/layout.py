@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -26,7 +27,18 @@ from pydantic import (
 )
 
 from mpm.materials import Material
-from mpm.units import Deadline, Dimension, Fraction, Instant, Length, Position, Positive, Speed, describe, reject
+from mpm.units import (
+    Deadline,
+    Dimension,
+    Fraction,
+    Instant,
+    Length,
+    Position,
+    Positive,
+    Speed,
+    describe,
+    reject,
+)
 
 _INSTANT = Dimension("s", "a time", "5 s", at_least=0.0)
 _DEADLINE = Dimension("s", "a time", "5 s", above=0.0, infinite=True)
@@ -48,7 +60,7 @@ def _read_windows(value: Any) -> tuple[tuple[float, float], ...]:
             raise reject(f"the window {describe(pair)}", accepted)
         pairs.append((_INSTANT.read(pair[0]), _DEADLINE.read(pair[1])))
     times = [time for pair in pairs for time in pair]
-    if any(later <= earlier for earlier, later in zip(times[:-1], times[1:], strict=True)):
+    if any(later <= earlier for earlier, later in pairwise(times)):
         raise reject(" and ".join(f"a window from {a:g} s to {b:g} s" for a, b in pairs), accepted)
     return tuple(pairs)
 
@@ -74,11 +86,18 @@ class Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+def only_name_required(schema: dict[str, Any]) -> None:
+    """Schema of an entry that may complete one of a shared geometry: there it need only say which."""
+    schema["required"] = ["name"]
+
+
 class Layer(Frozen):
     """A horizontal layer, `cells` rows high; `grading` is the height of its top row over that of its bottom row.
 
     `material` (a Material; None: gas) is resolved by the case from the name that the file gives.
     """
+
+    model_config = ConfigDict(json_schema_extra=only_name_required)
 
     name: Name
     height: Length
@@ -94,7 +113,10 @@ class Layer(Frozen):
 
 
 class _Port(Frozen):
+    model_config = ConfigDict(json_schema_extra=only_name_required)
+
     name: Name
+    side: Literal["bottom", "top"]
     center: Position
     width: Length
 
@@ -126,8 +148,11 @@ class Inlet(_Port):
     def _one_form_of_windows(self) -> Self:
         if not self.windows:
             if self.stop <= self.start:
-                raise reject(f"stop at {self.stop:g} s, start at {self.start:g} s", "a stop after the start",
-                             key="stop")
+                raise reject(
+                    f"stop at {self.stop:g} s, start at {self.start:g} s",
+                    "a stop after the start",
+                    key="stop",
+                )
             self.__dict__["windows"] = ((self.start, self.stop),)
         elif self.model_fields_set & {"start", "stop"}:
             raise reject("windows beside start or stop", "either start and stop, or windows", key="windows")
@@ -177,7 +202,9 @@ class Geometry(Frozen):
 
     model_config = ConfigDict(json_schema_extra=_base_may_give_it)
 
-    base: str | None = Field(None, exclude=True, description="a shared geometry file or built-in name that these keys override")
+    base: str | None = Field(
+        None, exclude=True, description="a shared geometry file or built-in name that these keys override"
+    )
     length: Length
     cell_width: Length = 0.34e-3
     periodic: Flag = True
@@ -206,16 +233,26 @@ class Geometry(Frozen):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.periodic and self.columns < 3:
-            raise reject(f"{self.columns} columns", "at least 3 columns in a periodic strip", key="cell_width")
+            raise reject(
+                f"{self.columns} columns", "at least 3 columns in a periodic strip", key="cell_width"
+            )
         _check_names("layer", self.layers)
         _check_names("port", (*self.inlets, *self.outlets))
         _check_names("zone", self.zones)
         moving = [layer.name for layer in self.layers if layer.moving]
         if len(moving) > 1:
-            raise reject(f"moving layers {', '.join(moving)}", "at most one moving layer", key=f"layer.{moving[1]}.moving")
+            raise reject(
+                f"moving layers {', '.join(moving)}",
+                "at most one moving layer",
+                key=f"layer.{moving[1]}.moving",
+            )
         for layer in self.layers:
             if layer.moving and layer.material_name is None:
-                raise reject("a moving layer of gas", "a material for the moving layer", key=f"layer.{layer.name}.moving")
+                raise reject(
+                    "a moving layer of gas",
+                    "a material for the moving layer",
+                    key=f"layer.{layer.name}.moving",
+                )
         for port in (*self.inlets, *self.outlets):
             _check_inside(f"{_kind(port)}.{port.name}", port.x0, port.x1, self.length)
         for side in ("bottom", "top"):
@@ -228,19 +265,23 @@ class Geometry(Frozen):
         self._check_zones()
         return self
 
-    def _check_side(self, ports: Sequence[Inlet | Outlet]) -> None:
+    def _check_side(self, ports: Sequence[_Port]) -> None:
         """Ports on one side may not overlap, and an outlet may not share a facet (a column) with another port."""
         tolerance = 1e-9 * self.length
         ordered = sorted(ports, key=lambda port: port.x0)
-        for left, right in zip(ordered[:-1], ordered[1:], strict=True):
-            key, where = f"{_kind(right)}.{right.name}", f"{_span(right.x0, right.x1)} next to {left.name} at {_span(left.x0, left.x1)}"
+        for left, right in pairwise(ordered):
+            key = f"{_kind(right)}.{right.name}"
+            where = f"{_span(right.x0, right.x1)} next to {left.name} at {_span(left.x0, left.x1)}"
             if right.x0 < left.x1 - tolerance:
                 raise reject(where, "ports that do not overlap", key=f"{key}.center")
             last_of_left = math.ceil((left.x1 - tolerance) / self.dx) - 1
             first_of_right = math.floor((right.x0 + tolerance) / self.dx)
             if last_of_left == first_of_right and (isinstance(left, Outlet) or isinstance(right, Outlet)):
-                raise reject(where, f"an outlet at least one column ({self.dx * 1e3:.3g} mm) away from other ports",
-                             key=f"{key}.center")
+                raise reject(
+                    where,
+                    f"an outlet at least one column ({self.dx * 1e3:.3g} mm) away from other ports",
+                    key=f"{key}.center",
+                )
 
     def _default_zones(self) -> tuple[Zone, ...]:
         """As many equal zones as inlets that dose, provided that each contains the centre of one of them."""
@@ -249,7 +290,9 @@ class Geometry(Frozen):
         if any(not i * share <= inlet.center <= (i + 1) * share for i, inlet in enumerate(dosing)):
             raise reject(
                 f"no zones, and dosing inlets at {', '.join(f'{inlet.center * 1e3:g} mm' for inlet in dosing)}",
-                f"a list of zones, since {len(dosing)} equal zones would not hold one dosing inlet each", key="zone")
+                f"a list of zones, since {len(dosing)} equal zones would not hold one dosing inlet each",
+                key="zone",
+            )
         edges = [i * share for i in range(len(dosing))] + [self.length]
         return tuple(
             Zone(name=f"zone{i + 1}", start=f"{edges[i]!r} m", end=f"{edges[i + 1]!r} m", inlet=inlet.name)
@@ -265,27 +308,46 @@ class Geometry(Frozen):
                 raise reject(_span(zone.start, zone.end), "an end after the start", key=f"{key}.end")
             _check_inside(key, zone.start, zone.end, self.length)
             if zone.end - zone.start < self.dx * (1.0 - 1e-9):
-                raise reject(_span(zone.start, zone.end), f"a zone of at least one column ({self.dx * 1e3:.3g} mm)", key=key)
+                raise reject(
+                    _span(zone.start, zone.end),
+                    f"a zone of at least one column ({self.dx * 1e3:.3g} mm)",
+                    key=key,
+                )
             if zone.inlet is None:
                 continue
             if zone.inlet not in inlets:
-                raise reject(repr(zone.inlet), f"the name of an inlet: {', '.join(inlets) or 'there is none'}",
-                             key=f"{key}.inlet", given=zone.inlet, known=list(inlets))
+                raise reject(
+                    repr(zone.inlet),
+                    f"the name of an inlet: {', '.join(inlets) or 'there is none'}",
+                    key=f"{key}.inlet",
+                    given=zone.inlet,
+                    known=list(inlets),
+                )
             if not zone.start - tolerance <= inlets[zone.inlet].center <= zone.end + tolerance:
-                raise reject(f"inlet {zone.inlet} at {inlets[zone.inlet].center * 1e3:g} mm",
-                             f"an inlet whose centre lies in the zone, {_span(zone.start, zone.end)}", key=f"{key}.inlet")
+                raise reject(
+                    f"inlet {zone.inlet} at {inlets[zone.inlet].center * 1e3:g} mm",
+                    f"an inlet whose centre lies in the zone, {_span(zone.start, zone.end)}",
+                    key=f"{key}.inlet",
+                )
         ordered = sorted(self.zones, key=lambda zone: zone.start)
-        for left, right in zip(ordered[:-1], ordered[1:], strict=True):
+        for left, right in pairwise(ordered):
             if right.start < left.end - tolerance:
-                raise reject(f"{_span(right.start, right.end)} and {left.name} at {_span(left.start, left.end)}",
-                             "zones that do not overlap", key=f"zone.{right.name}.start")
+                raise reject(
+                    f"{_span(right.start, right.end)} and {left.name} at {_span(left.start, left.end)}",
+                    "zones that do not overlap",
+                    key=f"zone.{right.name}.start",
+                )
         served = [zone.inlet for zone in self.zones if zone.inlet is not None]
         for inlet in served:
             if served.count(inlet) > 1:
-                raise reject(f"inlet {inlet} in {served.count(inlet)} zones", "at most one zone for each inlet", key="zone")
+                raise reject(
+                    f"inlet {inlet} in {served.count(inlet)} zones",
+                    "at most one zone for each inlet",
+                    key="zone",
+                )
 
 
-def _kind(port: Inlet | Outlet) -> str:
+def _kind(port: _Port) -> str:
     return type(port).__name__.lower()
 
 
@@ -304,6 +366,9 @@ def _check_names(kind: str, entries: Iterable[Layer | Inlet | Outlet | Zone]) ->
     for entry in entries:
         if entry.name in seen:
             table = type(entry).__name__.lower()
-            raise reject(f"{kind} name {entry.name!r} twice", f"a different name for every {kind}",
-                         key=f"{table}.{entry.name}.name")
+            raise reject(
+                f"{kind} name {entry.name!r} twice",
+                f"a different name for every {kind}",
+                key=f"{table}.{entry.name}.name",
+            )
         seen.add(entry.name)

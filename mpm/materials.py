@@ -15,7 +15,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, Wi
 
 from mpm.constants import AVOGADRO
 from mpm.units import (
-    Area,
     Conductivity,
     Density,
     Dimension,
@@ -46,7 +45,9 @@ def _site_density(value: Any) -> float:
         return SITE_DENSITIES[value]
     if isinstance(value, str) and not any(character.isdigit() for character in value.split(" ")[0]):
         names = ", ".join(SITE_DENSITIES)
-        raise reject(repr(value), f"{_SITES.accepted}, or a preset: {names}", given=value, known=list(SITE_DENSITIES))
+        raise reject(
+            repr(value), f"{_SITES.accepted}, or a preset: {names}", given=value, known=list(SITE_DENSITIES)
+        )
     return _SITES.read(value)
 
 
@@ -117,20 +118,29 @@ class Material(BaseModel):
         values = self.__dict__
         if "permeability" not in given:
             if d is None or self.kozeny_constant is None:
-                raise reject("nothing", "a permeability, e.g. \"4.25 um^2\", or particle_diameter, sphericity and "
-                             "kozeny_constant", key="permeability")
+                raise reject(
+                    "nothing",
+                    'a permeability, e.g. "4.25 um^2", or particle_diameter, sphericity and kozeny_constant',
+                    key="permeability",
+                )
             k = kozeny_carman(self.porosity, d, self.sphericity, self.kozeny_constant)
             values["permeability"] = (k, k)
         if "tortuosity_factor" not in given:
             values["tortuosity_factor"] = (self.porosity**-0.5,) * 2
         if "surface_to_volume" not in given:
             if d is None:
-                raise reject("nothing", 'a surface per total volume, e.g. "58000 1/m", or a particle_diameter',
-                             key="surface_to_volume")
+                raise reject(
+                    "nothing",
+                    'a surface per total volume, e.g. "58000 1/m", or a particle_diameter',
+                    key="surface_to_volume",
+                )
             values["surface_to_volume"] = (1.0 - self.porosity) * 6.0 / (self.sphericity * d)
         if self.initial_coverage and abs(sum(self.initial_coverage.values()) - 1.0) > 1e-9:
-            raise reject(f"coverages that sum to {sum(self.initial_coverage.values()):g}", "coverages that sum to 1",
-                         key="initial_coverage")
+            raise reject(
+                f"coverages that sum to {sum(self.initial_coverage.values()):g}",
+                "coverages that sum to 1",
+                key="initial_coverage",
+            )
         return self
 
 

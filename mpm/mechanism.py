@@ -17,7 +17,17 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSche
 from pydantic_core import PydanticCustomError
 
 from mpm.chemistry import GasReaction, Mechanism, Site, Species, SurfaceReaction
-from mpm.units import Dimension, Fraction, MolarEnergy, MolarMass, NonNegative, Number, Temperature, parse, reject
+from mpm.units import (
+    Dimension,
+    Fraction,
+    MolarEnergy,
+    MolarMass,
+    NonNegative,
+    Number,
+    Temperature,
+    parse,
+    reject,
+)
 
 _SURFACE_RATE = Dimension("m/s", "a surface rate constant", "0.9 m/s", at_least=0.0)
 _GAS_RATE = Dimension("m^3/mol/s", "a second-order rate constant", "1.0 m^3/kmol/s", at_least=0.0)
@@ -74,7 +84,9 @@ class ReactionTable(_Table):
 class Chemistry(_Table):
     """The `[chemistry]` table, with the mechanism's own tables merged in: complete in itself."""
 
-    mechanism: str = Field("alumina", description="a built-in mechanism, the path of a mechanism file, or inline")
+    mechanism: str = Field(
+        "alumina", description="a built-in mechanism, the path of a mechanism file, or inline"
+    )
     name: str = ""
     species: dict[str, SpeciesTable] = {}
     site: dict[str, SiteTable] = {}
@@ -128,8 +140,13 @@ def parse_equation(equation: str, known: Mapping[str, Any]) -> tuple[dict[str, f
             if name not in known:
                 name, count = match.group(2), float(match.group(1) or 1)
             if name not in known:
-                raise reject(f"{name!r} in {equation!r}", f"one of {', '.join(known)}", key="equation", given=name,
-                             known=list(known))
+                raise reject(
+                    f"{name!r} in {equation!r}",
+                    f"one of {', '.join(known)}",
+                    key="equation",
+                    given=name,
+                    known=list(known),
+                )
             terms[name] = terms.get(name, 0.0) + count
         sides.append(terms)
     if len(sides) != 2:
@@ -152,18 +169,27 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
     Raises validator errors (see `units.reject`) for unknown names, unbalanced elements or sites, and rate laws that
     do not fit the kind of reaction.
     """
-    species = {name: Species(name, table.molar_mass, _elements("species", name, table))
-               for name, table in chemistry.species.items()}
-    sites = {name: Site(name, _elements("site", name, table), table.molar_mass)
-             for name, table in chemistry.site.items()}
-    films = {name: Site(name, _elements("film", name, table), table.molar_mass)
-             for name, table in chemistry.film.items()}
+    species = {
+        name: Species(name, table.molar_mass, _elements("species", name, table))
+        for name, table in chemistry.species.items()
+    }
+    sites = {
+        name: Site(name, _elements("site", name, table), table.molar_mass)
+        for name, table in chemistry.site.items()
+    }
+    films = {
+        name: Site(name, _elements("film", name, table), table.molar_mass)
+        for name, table in chemistry.film.items()
+    }
     seen: set[str] = set()
     for kind, names in (("species", species), ("site", sites), ("film", films)):
         for name in names:
             if name in seen or "." in name:
-                raise reject(f"{name!r}", "a name without dots that no other species, site or film has",
-                             key=f"chemistry.{kind}.{name}")
+                raise reject(
+                    f"{name!r}",
+                    "a name without dots that no other species, site or film has",
+                    key=f"chemistry.{kind}.{name}",
+                )
             seen.add(name)
     known: dict[str, Species | Site] = {**species, **sites, **films}
     surface, gas = [], []
@@ -177,10 +203,18 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
                 gas.append(_gas_reaction(key, table, left, right, species))
         except PydanticCustomError as error:
             context = dict(error.context or {})
-            raise reject(**{**context, "key": f"chemistry.reaction.{key}.{context.get('key', 'equation')}"}) from None
+            raise reject(
+                **{**context, "key": f"chemistry.reaction.{key}.{context.get('key', 'equation')}"}
+            ) from None
     name = chemistry.name or chemistry.mechanism
-    return Mechanism(name, tuple(species.values()), tuple(sites.values()), tuple(films.values()), tuple(surface),
-                     tuple(gas))
+    return Mechanism(
+        name,
+        tuple(species.values()),
+        tuple(sites.values()),
+        tuple(films.values()),
+        tuple(surface),
+        tuple(gas),
+    )
 
 
 def _elements(kind: str, name: str, table: SpeciesTable | SiteTable) -> dict[str, float]:
@@ -189,8 +223,11 @@ def _elements(kind: str, name: str, table: SpeciesTable | SiteTable) -> dict[str
     try:
         return parse_formula(table.formula or name)
     except ValueError as error:
-        raise reject(str(error), 'a formula, e.g. "Al(CH3)3", or elements = { Al = 1, C = 3, H = 9 }',
-                     key=f"chemistry.{kind}.{name}.formula") from None
+        raise reject(
+            str(error),
+            'a formula, e.g. "Al(CH3)3", or elements = { Al = 1, C = 3, H = 9 }',
+            key=f"chemistry.{kind}.{name}.formula",
+        ) from None
 
 
 def _check_balance(
@@ -212,7 +249,9 @@ def _check_balance(
         raise reject(f"{equation!r}, which is off by {text}", "an equation that balances every element")
     lost = sum(left.get(name, 0.0) - right.get(name, 0.0) for name in sites)
     if abs(lost) > 1e-9:
-        raise reject(f"{equation!r}, which loses {lost:g} sites", "an equation that keeps the number of sites")
+        raise reject(
+            f"{equation!r}, which loses {lost:g} sites", "an equation that keeps the number of sites"
+        )
 
 
 def _surface_reaction(
@@ -232,8 +271,11 @@ def _surface_reaction(
     if not net[states[0]]:
         raise reject(repr(table.equation), "a surface reaction that changes the state of its site")
     if (table.sticking is None) == (table.A is None):
-        raise reject("both sticking and A" if table.A else "neither sticking nor A", "one of sticking and A",
-                     key="sticking")
+        raise reject(
+            "both sticking and A" if table.A else "neither sticking nor A",
+            "one of sticking and A",
+            key="sticking",
+        )
     A = 0.0
     if table.A is not None:
         try:
@@ -241,7 +283,14 @@ def _surface_reaction(
         except ValueError:
             raise reject(repr(table.A), _SURFACE_RATE.accepted, key="A") from None
     return SurfaceReaction(
-        key, write_equation(left, right), A, table.b, table.Ea, table.reference_temperature, gases[0], states[0],
+        key,
+        write_equation(left, right),
+        A,
+        table.b,
+        table.Ea,
+        table.reference_temperature,
+        gases[0],
+        states[0],
         {name: value for name, value in net.items() if name in species and value},
         {name: value for name, value in net.items() if name in sites and value},
         {name: value for name, value in net.items() if name in films and value},
@@ -266,6 +315,12 @@ def _gas_reaction(
         raise reject(repr(table.A), _GAS_RATE.accepted, key="A") from None
     net = {name: right.get(name, 0.0) - left.get(name, 0.0) for name in dict.fromkeys((*left, *right))}
     return GasReaction(
-        key, write_equation(left, right), A, table.b, table.Ea, table.reference_temperature,
-        dict.fromkeys(left, 1), {name: value for name, value in net.items() if value},
+        key,
+        write_equation(left, right),
+        A,
+        table.b,
+        table.Ea,
+        table.reference_temperature,
+        dict.fromkeys(left, 1),
+        {name: value for name, value in net.items() if value},
     )

@@ -23,12 +23,19 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
     key = address(location, data)
     if kind == "mpm":
         key = ".".join(part for part in (key, context.get("key", "")) if part)
-        return InputError.at(source, key, context["found"], context["accepted"], known=context.get("known", ()),
-                             given=context.get("given", ""))
+        return InputError.at(
+            source,
+            key,
+            context["found"],
+            context["accepted"],
+            known=context.get("known", ()),
+            given=context.get("given", ""),
+        )
     if kind == "extra_forbidden":
         known = known_keys(model, location[:-1])
-        return InputError.at(source, key, "an unknown key", f"one of {', '.join(known)}", known=known,
-                             given=str(location[-1]))
+        return InputError.at(
+            source, key, "an unknown key", f"one of {', '.join(known)}", known=known, given=str(location[-1])
+        )
     if kind == "missing":
         return InputError.at(source, key, "nothing", _expected(_field(model, location)), given="")
     found = describe(first["input"])
@@ -101,4 +108,6 @@ def _expected(field: FieldInfo | None) -> str:
             return item.accepted
     if field is not None and get_origin(field.annotation) is tuple:
         return "a list of tables, [[...]]"
-    return (field.description if field else None) or ("a whole number" if field and field.annotation is int else "a value")
+    return (field.description if field else None) or (
+        "a whole number" if field and field.annotation is int else "a value"
+    )

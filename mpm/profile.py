@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import math
+from itertools import pairwise
 from pathlib import Path
 
 from mpm.units import reject
@@ -24,10 +25,16 @@ def check_profile(path: Path, key: str) -> None:
         return reject(f"{path}: {found}", accepted, key=key, **context)
 
     try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"]
+        lines = [
+            line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"
+        ]
     except FileNotFoundError:
-        raise wrong("no such file", "thesis, phases, or a CSV file from mpm dem", given=path.name,
-                    known=["thesis", "phases"]) from None
+        raise wrong(
+            "no such file",
+            "thesis, phases, or a CSV file from mpm dem",
+            given=path.name,
+            known=["thesis", "phases"],
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise wrong(f"unreadable ({error})", "a CSV file from mpm dem") from None
     rows = list(csv.reader(lines))
@@ -45,6 +52,6 @@ def check_profile(path: Path, key: str) -> None:
         phases.append(values[header.index("phase_deg")])
     if len(phases) < 4:
         raise wrong(f"{len(phases)} rows", "at least 4 rows")
-    rising = all(a < b for a, b in zip(phases[:-1], phases[1:], strict=True))
+    rising = all(a < b for a, b in pairwise(phases))
     if not rising or phases[0] < 0.0 or phases[-1] > 360.0:
         raise wrong("phases that do not rise from 0 to 360", "phase_deg that rises within 0 to 360 deg")

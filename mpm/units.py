@@ -17,7 +17,9 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)(?![A-Za-z0-9_.])\s*(.*?)\s*$")
+_NUMBER = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)(?![A-Za-z0-9_.])\s*(.*?)\s*$"
+)
 _JOINED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*?)\s*$")
 _ANGLES = {"radian", "degree", "turn", "arcminute", "arcsecond", "revolutions_per_minute", "grade"}
 
@@ -147,7 +149,9 @@ class Dimension:
             serialization=core_schema.plain_serializer_function_ser_schema(self.write, when_used="json"),
         )
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
         if self.unit:
             return {
                 "type": "string",
@@ -161,7 +165,11 @@ class Dimension:
             "maximum": self.at_most,
             "exclusiveMaximum": self.below,
         }
-        return {"type": "number", "description": self.accepted, **{k: v for k, v in bounds.items() if v is not None}}
+        return {
+            "type": "number",
+            "description": self.accepted,
+            **{k: v for k, v in bounds.items() if v is not None},
+        }
 
 
 def describe(value: Any) -> str:
