@@ -35,9 +35,9 @@ def reduced_hamaker(hamaker: float, stiffness: float, material_stiffness: float)
     return hamaker * (stiffness / material_stiffness) ** 0.5
 
 
-def table_points(contact: float) -> int:
-    """Number of points that cover overlap and range of one contact distance [m] at `TABLE_SPACING`."""
-    return int((TABLE_OVERLAP * contact + OUTER_CUTOFF + 2e-9) / TABLE_SPACING) + 1
+def table_points(contact: float, spacing: float = TABLE_SPACING) -> int:
+    """Number of points, `spacing` [m] apart, that cover overlap and range of one contact distance [m]."""
+    return int((TABLE_OVERLAP * contact + OUTER_CUTOFF) / spacing) + 1
 
 
 def table_text(
@@ -51,12 +51,14 @@ def table_text(
 ) -> str:
     """One section of a LAMMPS table file over the distance of centres (or centre to wall).
 
-    `contact` is that distance at contact [m]. Pair tables are equidistant in r^2 (style and file agree in
-    `points`, so LAMMPS takes the values as they are), wall tables in r. The energy is the integral of the
+    `contact` is that distance at contact [m]. Pair tables are equidistant in r^2: style and file agree in
+    `points` and the upper end is the cutoff to the last bit, so LAMMPS takes the values as they are instead of a
+    spline that overshoots at the kink. Wall tables are equidistant in r. The energy is the integral of the
     force from the outer end.
     """
-    low, high = contact * (1.0 - TABLE_OVERLAP), contact + OUTER_CUTOFF + 2e-9
+    low, high = contact * (1.0 - TABLE_OVERLAP), contact + OUTER_CUTOFF
     if wall:
+        high += 2e-9  # here LAMMPS wants the table to reach beyond the cutoff
         r = np.linspace(low, high, points)
     else:
         r = np.sqrt(np.linspace(low**2, high**2, points))
