@@ -191,7 +191,8 @@ class RunDirectory:
         buffer = io.BytesIO()
         text = json.dumps(plain(meta, "checkpoint.npz"), allow_nan=False)
         stored: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items()}
-        np.savez(buffer, **stored, **{META: np.frombuffer(text.encode(), dtype=np.uint8)})
+        stored[META] = np.frombuffer(text.encode(), dtype=np.uint8)
+        np.savez(buffer, **stored)
         write_atomically(self.path / "checkpoint.npz", buffer.getvalue(), sync=True)
 
     def read_checkpoint(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:

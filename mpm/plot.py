@@ -1,0 +1,190 @@
+"""Pictures of a finished run, drawn from the files in its directory alone.
+
+| picture | shows |
+|---|---|
+| `coverage.png` | the strip to scale with its layers and ports, coverage in the porous layers; the bed again, stretched |
+| `map_<SPECIES>.png` | mole fraction of each precursor that is fed, four decades |
+| `map_cvd.png` | rate of the parasitic gas-phase reaction, where there is one |
+| `history.png` | titration of each dosing inlet, balances on a logarithmic axis |
+| `outlets.png` | mole fractions in each outlet |
+| `exit_profile.png` | coverage over the height of the bed where it leaves each dosing zone |
+
+The colours are those of Okabe and Ito (2008) and matplotlib's cividis and viridis: all stay apart for colour-blind readers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from cycler import cycler
+from matplotlib import style
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, species_figure
+from mpm.results import Run, dosing_inlets, fed_species, load_run, made_site, made_sites
+
+Floats = NDArray[np.float64]
+
+STYLE = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.prop_cycle": cycler(color=OKABE_ITO),
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "savefig.dpi": 200,
+}
+
+
+def plot_run(directory: str | Path) -> list[Path]:
+    """Draw all pictures that the files of a run allow, into its `plots/`; returns their paths."""
+    run = load_run(directory)
+    run.directory.plots.mkdir(exist_ok=True)
+    paths = []
+    with style.context(STYLE):
+        for name, figure in figures(run):
+            paths.append(run.directory.plots / f"{name}.png")
+            figure.savefig(paths[-1])
+    return paths
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """Name and figure of every picture; a run without stored fields, or with a single output time, has fewer."""
+    if run.times:
+        snapshot = run.snapshot()
+        for site in made_sites(run.case):
+            name = "coverage" if site == made_sites(run.case)[0] else f"coverage_{site}"
+            yield name, coverage_figure(run, snapshot, site)
+        for species in fed_species(run.case):
+            yield f"map_{species}", species_figure(run, snapshot, species)
+        if np.any(snapshot.cell_data.get("cvd_rate", np.zeros(1))):
+            yield "map_cvd", cvd_figure(run, snapshot)
+        if exits(run):
+            yield "exit_profile", exit_profile_figure(run)
+    if len(run.history.get("time", ())) > 1:
+        yield "history", history_figure(run)
+        if any(outlet_species(run, outlet.name) for outlet in run.case.geometry.outlets):
+            yield "outlets", outlets_figure(run)
+
+
+def history_figure(run: Run) -> Figure:
+    """Titration of every dosing inlet over time, and the magnitude of every balance error."""
+    time = run.history["time"]
+    titration = [
+        key for key in run.history if re.fullmatch(r"titration\..+\.(box_mean|exit_mean|exit_min)", key)
+    ]
+    balances = [key for key in run.history if key.startswith(("balance.", "elements."))]
+    panels = [keys for keys in (titration, balances) if keys]
+    figure = Figure(figsize=(7.0, 2.9 * len(panels)), layout="constrained")
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    dashes = {"box_mean": "-", "exit_mean": "--", "exit_min": ":"}
+    inlets = list(dict.fromkeys(key.split(".", 1)[1].rsplit(".", 1)[0] for key in titration))
+    for panel, keys in zip(axes, panels, strict=True):
+        for key in keys:
+            values = run.history[key]
+            if keys is titration:
+                _, rest = key.split(".", 1)
+                inlet, kind = rest.rsplit(".", 1)
+                colour = OKABE_ITO[inlets.index(inlet) % len(OKABE_ITO)]
+                text = f"{inlet}: {kind.replace('_', ' ')}"
+                panel.plot(time, values, dashes[kind], color=colour, label=text)
+            else:
+                panel.semilogy(time, positive(np.abs(values)), label=formula(key.split(".", 1)[1]))
+        panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+        panel.grid(alpha=0.25)
+    if titration:
+        axes[0].set_ylim(-0.03, 1.03)
+        axes[0].set_ylabel("coverage made by the inlet")
+    if balances:
+        axes[-1].set_ylabel("balance error, relative")
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def outlets_figure(run: Run) -> Figure:
+    """Flux-weighted mole fraction of every species in every outlet; the carrier, nearly one, is left out."""
+    names = [outlet.name for outlet in run.case.geometry.outlets if outlet_species(run, outlet.name)]
+    columns = min(2, len(names))
+    rows = -(-len(names) // columns)
+    figure = Figure(figsize=(0.8 + 3.9 * columns, 0.4 + 2.6 * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    largest = max(np.nanmax(values) for name in names for values in outlet_species(run, name).values())
+    species = run.case.mechanism.species_names
+    for panel, name in zip(axes.flat, names, strict=False):
+        for one, values in outlet_species(run, name).items():
+            colour = OKABE_ITO[list(species).index(one) % len(OKABE_ITO)]
+            panel.semilogy(run.history["time"], positive(values), color=colour, label=formula(one))
+        panel.set_title(f"outlet {name}", fontsize=9)
+        panel.grid(alpha=0.25)
+    if largest > 0.0:
+        axes[0, 0].set_ylim(largest * 1e-6, largest * 3.0)
+    for panel in axes.flat[len(names) :]:
+        panel.set_visible(False)
+    for panel in axes[:, 0]:
+        panel.set_ylabel("mole fraction")
+    for panel in axes[-1]:
+        panel.set_xlabel("time [s]")
+    handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
+    figure.legend(handles.values(), handles.keys(), loc="outside right upper", fontsize=8)
+    return figure
+
+
+def outlet_species(run: Run, outlet: str) -> dict[str, Floats]:
+    """Histories of the mole fractions in one outlet by species, carrier excepted."""
+    keys = {name: f"outlets.{outlet}.x.{name}" for name in run.case.mechanism.species_names}
+    return {name: run.history[key] for name, key in keys.items() if key in run.history}
+
+
+def positive(values: Floats) -> Floats:
+    """The values for a logarithmic axis: gaps (NaN) where they are zero or negative."""
+    return np.where(values > 0.0, values, np.nan)
+
+
+def exits(run: Run) -> list[tuple[str, str, str, int]]:
+    """Zone, inlet, site species that the inlet makes, and last column of each zone that doses a moving bed."""
+    if not any(layer.moving for layer in run.case.geometry.layers):
+        return []
+    inlets = {inlet.name: made_site(run.case, inlet) for inlet in dosing_inlets(run.case)}
+    found = []
+    for number, zone in enumerate(run.case.geometry.zones, start=1):
+        site = inlets.get(zone.inlet) if zone.inlet else None
+        columns = np.flatnonzero(run.grid.zone_of_column == number)
+        if zone.inlet and site and len(columns):
+            found.append((zone.name, zone.inlet, site, int(columns[-1])))
+    return found
+
+
+def exit_profile_figure(run: Run, count: int = 5) -> Figure:
+    """Coverage over height in the last column of each dosing zone, at up to `count` output times."""
+    shown = exits(run)
+    rows = run.grid.layer_rows(next(layer.name for layer in run.case.geometry.layers if layer.moving))
+    y = 0.5 * (run.grid.y[1:] + run.grid.y[:-1])[rows] * MM
+    steps = np.unique(np.linspace(0, len(run.times) - 1, count).round().astype(int))
+    columns = min(4, len(shown))
+    lines = -(-len(shown) // columns)
+    figure = Figure(figsize=(1.6 + 2.9 * columns, 0.2 + 3.0 * lines), layout="constrained")
+    axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    shades = mpl.colormaps["cividis_r"](np.linspace(0.15, 1.0, len(steps)))
+    for step, colour in zip(steps, shades, strict=True):
+        snapshot = run.snapshot(int(step))
+        for panel, (_, _, site, column) in zip(axes.flat, shown, strict=False):
+            theta = run.field(snapshot, f"theta_{site}")[rows, column]
+            panel.plot(theta, y, "o-", markersize=3, color=colour, label=f"{snapshot.time:.4g} s")
+    for panel, (zone, inlet, site, _) in zip(axes.flat, shown, strict=False):
+        panel.set_title(f"exit of zone {zone} (inlet {inlet})", fontsize=9)
+        panel.set_xlabel(f"coverage of {formula(site)}")
+        panel.set_xlim(-0.03, 1.03)
+        panel.grid(alpha=0.25)
+    for panel in axes.flat[len(shown) :]:
+        panel.set_visible(False)
+    for panel in axes[:, 0]:
+        panel.set_ylabel("height y [mm] (0: top of bed)")
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), loc="outside right upper", title="time", fontsize=8
+    )
+    return figure

@@ -1,0 +1,88 @@
+"""A finished run, read back from the files in its directory alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.case import Case, load_case
+from mpm.errors import InputError
+from mpm.geometry import Grid
+from mpm.output import RunDirectory
+from mpm.vtu import Snapshot
+
+if TYPE_CHECKING:
+    from mpm.case import Inlet
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What the directory of a run holds."""
+
+    directory: RunDirectory
+    case: Case
+    grid: Grid
+    history: Mapping[str, Floats]
+    summary: Mapping[str, Any]
+
+    @property
+    def times(self) -> list[float]:
+        """Times of the stored fields [s]."""
+        return [time for time, _ in self.directory.steps]
+
+    def snapshot(self, index: int = -1) -> Snapshot:
+        return self.directory.read_fields(index)
+
+    def field(self, snapshot: Snapshot, name: str) -> Floats:
+        """A cell field as (rows, columns), bottom row first."""
+        if name not in snapshot.cell_data:
+            known = ", ".join(snapshot.cell_data)
+            raise InputError(f"{self.directory.pvd}: no field {name!r}; there are {known}")
+        return snapshot.cell_data[name].astype(float).reshape(self.grid.rows, self.grid.columns)
+
+
+def load_run(directory: str | Path) -> Run:
+    """Read a run's directory. Raises InputError when it is not one."""
+    path = Path(directory)
+    if not (path / "case.toml").exists():
+        raise InputError(f"{path}: not the directory of a run (it has no case.toml)")
+    files = RunDirectory(path)
+    case = load_case(path / "case.toml")
+    return Run(files, case, Grid.from_case(case), files.history(), files.read_summary() or {})
+
+
+def fed_by(inlet: Inlet, species: Sequence[str]) -> list[str]:
+    """Those of the `species` that an inlet feeds, in their order."""
+    return [name for name in species if inlet.mass_fractions.get(name, 0.0) > 0.0]
+
+
+def dosing_inlets(case: Case) -> list[Inlet]:
+    """Inlets that feed a species of the mechanism."""
+    return [inlet for inlet in case.geometry.inlets if fed_by(inlet, case.mechanism.species_names)]
+
+
+def fed_species(case: Case) -> list[str]:
+    """Species fed by any inlet, in the mechanism's order."""
+    fed = {name for inlet in case.geometry.inlets for name in fed_by(inlet, case.mechanism.species_names)}
+    return [name for name in case.mechanism.species_names if name in fed]
+
+
+def made_site(case: Case, inlet: Inlet) -> str | None:
+    """Site species that this inlet's half-reaction makes; None when nothing it feeds reacts on the surface."""
+    for reaction in case.mechanism.surface_reactions:
+        if inlet.mass_fractions.get(reaction.gas, 0.0) > 0.0:
+            return next((site for site, nu in reaction.nu_site.items() if nu > 0), None)
+    return None
+
+
+def made_sites(case: Case) -> list[str]:
+    """Site species worth a map: of two that add up to one, the one the first dosing inlet makes."""
+    made = list(dict.fromkeys(site for inlet in dosing_inlets(case) if (site := made_site(case, inlet))))
+    return made[:1] if len(case.mechanism.site_names) == 2 else made

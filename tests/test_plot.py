@@ -1,0 +1,265 @@
+"""Pictures show the data that the run's directory holds, in the right place and unit."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+
+from mpm.case import Case, load_case
+from mpm.errors import InputError
+from mpm.geometry import Grid
+from mpm.maps import WIDTH, coverage_figure, cvd_figure, formula, species_figure, spread
+from mpm.output import RunDirectory
+from mpm.plot import exit_profile_figure, figures, history_figure, outlets_figure, plot_run
+from mpm.results import Run, dosing_inlets, fed_species, load_run, made_site
+
+SITE = "OAl(CH3)2"
+TIMES = np.linspace(0.0, 2.0, 9)
+
+
+def centres(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    x, y = np.meshgrid(0.5 * (grid.x[1:] + grid.x[:-1]), 0.5 * (grid.y[1:] + grid.y[:-1]))
+    return x, y
+
+
+def theta(grid: Grid, t: float) -> np.ndarray:
+    """Different in every cell and at every time."""
+    x, y = centres(grid)
+    return (0.2 + 0.5 * x / grid.x[-1] + 10.0 * y) * t / 2.0
+
+
+def write_run(path: Path, case: Case, times: np.ndarray = TIMES) -> Run:
+    """A directory as a run leaves it, with made-up numbers."""
+    directory = RunDirectory(path, precision="Float64")
+    directory.prepare()
+    directory.write_case(case.to_toml())
+    grid = Grid.from_case(case)
+    x, y = centres(grid)
+    for t in times:
+        data: dict[str, np.ndarray] = {f"theta_{SITE}": theta(grid, t), "theta_OH": 1.0 - theta(grid, t)}
+        data |= {f"x_{name}": np.exp(-x / 0.01) * 1e-4 for name in fed_species(case)}
+        data["cvd_rate"] = 1e-3 * np.exp(-((y / 1e-3) ** 2))
+        directory.write_fields(float(t), grid, {name: values.ravel() for name, values in data.items()})
+        row: dict[str, float | None] = {"time": float(t), "balance.TMA": -1e-13 * t, "balance.sites": 0.0}
+        for inlet in dosing_inlets(case):
+            row |= {f"titration.{inlet.name}.box_mean": t / 4, f"titration.{inlet.name}.exit_mean": t / 2}
+        for number, outlet in enumerate(case.geometry.outlets):
+            row |= {
+                f"outlets.{outlet.name}.x.{s}": 1e-6 * t * (number + 1) for s in case.mechanism.species_names
+            }
+        directory.append_history(row)
+    directory.write_summary({"status": "done"})
+    return load_run(path)
+
+
+@pytest.fixture
+def zone(tmp_path: Path) -> Run:
+    return write_run(tmp_path / "zone", load_case("single_zone", {"geometry.cell_width": "2 mm"}))
+
+
+@pytest.fixture
+def cycle(tmp_path: Path) -> Run:
+    return write_run(tmp_path / "cycle", load_case("single_cycle", {"geometry.cell_width": "2 mm"}))
+
+
+def meshes(axes: Axes) -> list[QuadMesh]:
+    return [child for child in axes.get_children() if isinstance(child, QuadMesh)]
+
+
+def drawn(mesh: QuadMesh) -> np.ma.MaskedArray[Any, Any]:
+    values = mesh.get_array()
+    assert values is not None
+    return np.ma.asarray(values)
+
+
+def texts(axes: Axes) -> list[str]:
+    return [text.get_text() for text in axes.texts]
+
+
+def test_coverage_map_is_to_scale_and_in_place(zone: Run) -> None:
+    """Fails when rows or columns are swapped, gas layers are coloured, units are not mm, or the strip is distorted."""
+    figure = coverage_figure(zone, zone.snapshot(), SITE)
+    strip, bed = figure.axes[:2]
+    (mesh,) = meshes(strip)
+    values = drawn(mesh)
+    grid = zone.grid
+    porous = np.isin(grid.row_layer, [1, 2])
+    assert np.array_equal(np.ma.getmaskarray(values)[:, 0], ~porous)
+    assert np.array_equal(values[porous], theta(grid, 2.0)[porous])
+    corners = mesh.get_coordinates()
+    assert np.allclose(corners[0, :, 0], grid.x * 1e3) and np.allclose(corners[:, 0, 1], grid.y * 1e3)
+    assert list(corners[-1, -1]) == pytest.approx([139.7, 12.7]) and mesh.get_clim() == (0.0, 1.0)
+    assert strip.get_aspect() == 1.0
+    (close,) = meshes(bed)
+    assert np.array_equal(drawn(close), theta(grid, 2.0)[grid.layer_rows("bed")])
+    assert list(close.get_coordinates()[[0, -1], 0, 1]) == pytest.approx([-3.0, 0.0])
+
+
+def test_strip_takes_its_share_of_the_page(zone: Run) -> None:
+    """Fails when the drawn strip is not 22.29/139.7 as high as wide, or is squeezed by labels to less than 6 inches."""
+    figure = coverage_figure(zone, zone.snapshot(), SITE)
+    figure.canvas.draw()
+    box = figure.axes[0].bbox
+    assert box.height / box.width == pytest.approx(22.29 / 139.7, rel=0.01)
+    assert 6.0 < box.width / figure.dpi <= WIDTH * 1.2
+
+
+def test_layers_ports_and_zones_are_drawn(cycle: Run) -> None:
+    """Fails when a port is missing or off its place, a layer has no name, or the zones' boundary is not drawn."""
+    strip = coverage_figure(cycle, cycle.snapshot(), SITE).axes[0]
+    geometry = cycle.case.geometry
+    ports = {
+        (round(x[0], 6), round(x[1], 6), y[0])
+        for line in strip.get_lines()
+        if line.get_gid() == "port"
+        for x, y in [(np.asarray(line.get_xdata()), np.asarray(line.get_ydata()))]
+    }
+    expected = {(round(i.x0 * 1e3, 6), round(i.x1 * 1e3, 6), 0.0) for i in geometry.inlets}
+    expected |= {(round(o.x0 * 1e3, 6), round(o.x1 * 1e3, 6), 1.0) for o in geometry.outlets}
+    assert ports == expected
+    labels = texts(strip)
+    for port in [*geometry.inlets, *geometry.outlets]:
+        assert f"\u2191 {port.name}" in labels
+    for layer in geometry.layers:
+        assert any(label.startswith(layer.name) for label in labels)
+    lines = [
+        np.asarray(line.get_xdata(), dtype=float) for line in strip.get_lines() if line.get_gid() != "port"
+    ]
+    assert any(np.allclose(x, 139.7) for x in lines)
+
+
+def test_precursor_map_spans_four_decades(cycle: Run) -> None:
+    """Fails when another field is drawn, the scale is linear, or the colour range does not follow the data."""
+    for name in ("TMA", "H2O"):
+        figure = species_figure(cycle, cycle.snapshot(), name)
+        (mesh,) = meshes(figure.axes[0])
+        values = drawn(mesh)
+        assert np.array_equal(values, cycle.field(cycle.snapshot(), f"x_{name}"))
+        low, high = mesh.get_clim()
+        assert high == values.max() and high / low == pytest.approx(1e4)
+        assert formula(name) in figure.axes[1].get_ylabel()
+    (mesh,) = meshes(cvd_figure(cycle, cycle.snapshot()).axes[0])
+    assert drawn(mesh).max() == cycle.field(cycle.snapshot(), "cvd_rate").max()
+
+
+def test_an_all_zero_field_can_be_drawn(zone: Run) -> None:
+    """Fails when a species that has not arrived yet breaks the logarithmic scale."""
+    snapshot = zone.snapshot()
+    snapshot.cell_data["x_TMA"] = np.zeros(zone.grid.cells)
+    figure = species_figure(zone, snapshot, "TMA")
+    figure.canvas.draw()
+    assert drawn(meshes(figure.axes[0])[0]).max() == 0.0
+
+
+def by_label(figure: Figure, panel: int) -> dict[str, np.ndarray]:
+    return {str(line.get_label()): np.asarray(line.get_ydata()) for line in figure.axes[panel].get_lines()}
+
+
+def test_history_curves(cycle: Run) -> None:
+    """Fails when a curve is missing, is another column's, or a balance error loses its magnitude."""
+    figure = history_figure(cycle)
+    titration, balance = by_label(figure, 0), by_label(figure, 1)
+    assert set(titration) == {
+        f"{i.name}: {kind} mean" for i in dosing_inlets(cycle.case) for kind in ("box", "exit")
+    }
+    for inlet in dosing_inlets(cycle.case):
+        assert np.array_equal(titration[f"{inlet.name}: box mean"], TIMES / 4)
+        assert np.array_equal(titration[f"{inlet.name}: exit mean"], TIMES / 2)
+    assert np.allclose(balance["TMA"][1:], 1e-13 * TIMES[1:]) and np.isnan(balance["sites"]).all()
+    assert figure.axes[1].get_yscale() == "log" and figure.axes[1].get_xlabel() == "time [s]"
+
+
+def test_outlet_curves(cycle: Run) -> None:
+    """Fails when an outlet or a species is missing, or curves of two outlets are exchanged."""
+    figure = outlets_figure(cycle)
+    for panel, outlet in enumerate(cycle.case.geometry.outlets):
+        assert figure.axes[panel].get_title() == f"outlet {outlet.name}"
+        curves = by_label(figure, panel)
+        assert set(curves) == {formula(name) for name in cycle.case.mechanism.species_names}
+        for values in curves.values():
+            assert np.allclose(values[1:], 1e-6 * TIMES[1:] * (panel + 1))
+
+
+def test_exit_profile_is_the_last_column_of_the_zone(cycle: Run) -> None:
+    """Fails when another column, row order, time or site is drawn."""
+    figure = exit_profile_figure(cycle)
+    grid = cycle.grid
+    rows = grid.layer_rows("bed")
+    y = 0.5 * (grid.y[1:] + grid.y[:-1])[rows] * 1e3
+    inlets = dosing_inlets(cycle.case)
+    assert [made_site(cycle.case, inlet) for inlet in inlets] == [SITE, "OH"]
+    for panel, column in ((0, grid.columns // 2 - 1), (1, grid.columns - 1)):
+        last = figure.axes[panel].get_lines()[-1]
+        expected = theta(grid, 2.0)[rows, column]
+        assert np.allclose(np.asarray(last.get_xdata()), expected if panel == 0 else 1.0 - expected)
+        assert np.allclose(np.asarray(last.get_ydata()), y)
+        assert last.get_label() == "2 s" and len(figure.axes[panel].get_lines()) == 5
+
+
+def test_plot_run_writes_every_picture(cycle: Run) -> None:
+    """Fails when a picture is missing, or nothing but background is in it."""
+    from matplotlib.image import imread
+
+    paths = plot_run(cycle.directory.path)
+    names = ["coverage", "map_TMA", "map_H2O", "map_cvd", "exit_profile", "history", "outlets"]
+    assert [path.stem for path in paths] == names and {path.parent.name for path in paths} == {"plots"}
+    for path in paths:
+        pixels = imread(path)[..., :3].reshape(-1, 3)
+        assert len(np.unique((pixels * 255).astype(int), axis=0)) > 20
+
+
+def test_run_without_history_or_fields(tmp_path: Path) -> None:
+    """A run stopped early, or a steady one: fails when what is there is not drawn or what is not there stops it."""
+    case = load_case("single_zone", {"geometry.cell_width": "2 mm"})
+    one = write_run(tmp_path / "one", case, TIMES[-1:])
+    assert [name for name, _ in figures(one)] == ["coverage", "map_TMA", "map_cvd", "exit_profile"]
+    none = write_run(tmp_path / "none", case, TIMES[:0])
+    assert plot_run(none.directory.path) == []
+
+
+def test_long_strip_is_stretched_and_says_so(tmp_path: Path) -> None:
+    """Four cycles are 1117.6 mm by 22 mm: fails when the strip is drawn as an unreadable line, or names overlap."""
+    changes = {"geometry.cell_width": "5 mm", "geometry.length": "1117.6 mm"}
+    figure = coverage_figure(
+        run := write_run(tmp_path / "long", load_case("single_zone", changes)), run.snapshot(), SITE
+    )
+    figure.canvas.draw()
+    strip = figure.axes[0]
+    stretch = strip.get_aspect()
+    assert isinstance(stretch, float | int) and stretch >= 2
+    assert f"stretched {stretch:.0f} times" in strip.get_title()
+    assert strip.bbox.height / figure.dpi > 0.6
+    names = [t for t in strip.texts if re.match(r"(plenum|frit|bed|headspace)", t.get_text())]
+    boxes = sorted((t.get_window_extent() for t in names), key=lambda box: box.y0)
+    assert len(boxes) == 4 and all(a.y1 <= b.y1 - 0.6 * b.height for a, b in pairwise(boxes))
+
+
+def test_labels_are_spread_no_more_than_needed() -> None:
+    """Fails when labels stay closer than asked, or ones with room are moved."""
+    assert spread([0.0, 5.0, 10.0], 2.0) == [0.0, 5.0, 10.0]
+    moved = spread([0.0, 0.1, 0.2, 9.0], 1.0)
+    assert np.all(np.diff(moved) >= 1.0 - 1e-12) and moved[1] == pytest.approx(0.1) and moved[3] == 9.0
+
+
+def test_formulas() -> None:
+    """Fails when digits of a formula stay on the line or those of a name are lowered."""
+    assert formula("OAl(CH3)2") == "OAl(CH$_{3}$)$_{2}$"
+    assert formula("sites") == "sites"
+
+
+def test_not_a_run_is_bad_input(tmp_path: Path) -> None:
+    """Fails when a directory without a run gives anything but one line."""
+    with pytest.raises(InputError, match=r"case\.toml"):
+        plot_run(tmp_path)
+
+
+def test_missing_field_names_those_that_exist(zone: Run) -> None:
+    """Fails when the message does not say what could have been asked for."""
+    with pytest.raises(InputError, match=r"x_CO.*x_TMA"):
+        species_figure(zone, zone.snapshot(), "CO")
