@@ -23,7 +23,7 @@ from mpm.flow import FaceFlow
 from mpm.fluxes import FluxAssembler, FluxOperator
 from mpm.kinetics import GasKinetics, Roles, SurfaceKinetics
 from mpm.parallel import largest, total
-from mpm.solvers import DirectSolver, KrylovSolver
+from mpm.solvers import KrylovSolver
 from mpm.strip import Strip
 
 if TYPE_CHECKING:
@@ -33,7 +33,8 @@ Floats = NDArray[np.float64]
 NEWTON_LIMIT = 30
 RESIDUAL = 1e-11  # sum of |residual| over all cells, relative to the largest feed
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
-FORCING = 1e-2  # inner tolerance of the inexact Newton iteration
+FORCING = (1e-2, 1e-4)  # inner tolerance of the inexact Newton iteration: while the front settles, and after
+SETTLED = 3e-2  # residual below which Newton converges quadratically
 HALVINGS = 6
 
 
@@ -151,12 +152,11 @@ class Transport:
         self._assemblers = [FluxAssembler(case, strip, d, dispersion) for d in self._distinct]
         self._flows: list[list[FluxOperator]] = []
         self._linear = [_StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s") for d in self._distinct]
-        self._factored: dict[tuple[int, int, float], _StepMatrix] = {}
-        self.direct_limit = 4  # velocity fields up to which the linear species keep one LU factor each
         if self.roles.coupled:
             self._jacobian = CellMatrix(strip, len(self.roles.coupled))
-            self._newton = KrylovSolver(self._jacobian.matrix, "reacting species", FORCING)
+            self._newton = KrylovSolver(self._jacobian.matrix, "reacting species", FORCING[0])
             self._step, self._rhs = self._jacobian.matrix.createVecs()
+        self._jacobian_key: int | None = None
         self.iterations = 0
 
     def _stoichiometry(self) -> None:
@@ -178,8 +178,7 @@ class Transport:
         self._flows[number] = [assembler.operator(flow) for assembler in self._assemblers]
         for linear in self._linear:
             linear.key = None
-        for key in [key for key in self._factored if key[1] == number]:
-            del self._factored[key]
+        self._jacobian_key = None
 
     # --- one step ---
 
@@ -255,18 +254,8 @@ class Transport:
         return linear
 
     def _solve_linear(self, i: int, number: int, dt: float, old: Floats, supply: Floats) -> Floats:
-        group = self._group[i]
         rhs = self.gas_volume * old / dt + supply
-        if len(self._flows) > self.direct_limit:
-            return self._matrix(group, number, dt).solve(rhs, old, self.feed_rate * RESIDUAL)
-        key = (group, number, dt)
-        if key not in self._factored:
-            factored = _StepMatrix(self.strip, self.gas_volume, self._linear[group].name)
-            factored.update(self._flows[number][group], dt)
-            if len(self._factored) > 2 * self.direct_limit:
-                self._factored.clear()
-            self._factored[key] = factored
-        return self._factored[key].solve_directly(rhs)
+        return self._matrix(self._group[i], number, dt).solve(rhs, old, self.feed_rate * RESIDUAL)
 
     def _solve_coupled(
         self, number: int, dt: float, old: Floats, supply: Floats, theta: Floats
@@ -275,8 +264,10 @@ class Transport:
         b, own = old.shape
         groups = self._group[:b]
         matrices = [self._matrix(group, number, dt) for group in groups]
-        diagonal = self._jacobian.set_fluxes([self._flows[number][group] for group in groups])
-        diagonal += self.gas_volume / dt
+        if self._jacobian_key != number:
+            self._diagonal = self._jacobian.set_fluxes([self._flows[number][group] for group in groups])
+            self._jacobian_key = number
+        diagonal = self._diagonal + self.gas_volume / dt
         rhs = self.gas_volume * old / dt + supply
         new = old.copy()
         cells = self.bed.cells
@@ -284,7 +275,7 @@ class Transport:
         for _iteration in range(NEWTON_LIMIT):
             rates, slopes = self.surface.rates(new[:, cells], theta, dt)
             gas_rates, gas_slopes = self.gas.rates(new)
-            source = (self.nu_gas[:, :b].T @ gas_rates) * self.gas_volume
+            source = (self.nu_gas[:, :b].T @ gas_rates) * self.gas_volume if len(gas_rates) else np.zeros_like(new)
             source[:, cells] += (self.nu_surface[:, :b].T @ rates) * self.active_area
             residual = np.stack([m.multiply(c) for m, c in zip(matrices, new, strict=True)]) - rhs - source
             worst = total(self.strip.comm, [np.abs(residual).sum()])[0] / scale
@@ -293,13 +284,15 @@ class Transport:
                 return new, rates, gas_rates
             if not np.isfinite(worst):
                 break
-            blocks = np.einsum("ri,rjn->nij", self.nu_gas[:, :b], gas_slopes) * -self.gas_volume[:, None, None]
+            blocks = np.zeros((own, b, b))
+            if len(gas_rates):
+                blocks -= np.einsum("ri,rjn->nij", self.nu_gas[:, :b], gas_slopes) * self.gas_volume[:, None, None]
             blocks[cells] -= np.einsum("ri,rjn->nij", self.nu_surface[:, :b], slopes) * self.active_area[:, None, None]
             for i in range(b):
                 blocks[:, i, i] += diagonal[i]
             self._jacobian.assemble(blocks)
             self._rhs.array[:] = residual.T.ravel()
-            self.iterations += self._newton.solve(self._rhs, self._step)
+            self.iterations += self._newton.solve(self._rhs, self._step, FORCING[int(worst < SETTLED)])
             new = new - self._step.array.reshape(own, b).T
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
@@ -344,7 +337,6 @@ class _StepMatrix:
         self.gas_volume, self.name = gas_volume, name
         self.key: tuple[int, float] | None = None
         self.krylov: KrylovSolver | None = None
-        self.direct: DirectSolver | None = None
         self.x, self.y = self.cells.matrix.createVecs()
 
     def update(self, operator: FluxOperator, dt: float) -> None:
@@ -364,13 +356,6 @@ class _StepMatrix:
         self.y.array[:] = rhs
         self.x.array[:] = guess
         self.krylov.solve(self.y, self.x, guess=True)
-        return self.x.array.copy()
-
-    def solve_directly(self, rhs: Floats) -> Floats:
-        if self.direct is None:
-            self.direct = DirectSolver(self.cells.matrix, self.name)
-        self.y.array[:] = rhs
-        self.direct.solve(self.y, self.x)
         return self.x.array.copy()
 
 
