@@ -1,0 +1,76 @@
+"""Drag of the gas in the bed: uniform flux through slabs of local voidage (3-3 ... 3-9 in one dimension).
+
+The gas is incompressible and the box is periodic sideways, so the volume flux j normal to the base is the same at
+every height and equals the aeration velocity in the conveyor's frame. With eps grad p = -beta (u_g - u_s) the
+pressure and the drag term of (3-9) add up to the force on one particle
+
+    f = V_p beta(eps)/(eps^2 (1 - eps)) (j - u_z),
+
+which at rest is Ergun's pressure drop. Along the base the gas moves with the bed, so no force acts there.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .powder import Powder
+from .relations import gidaspow_beta
+
+SLAB = 2.5  # height of a slab in mean diameters, the seed's grid of the gas
+
+
+def slab_solids(height: np.ndarray, diameter: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Volume of the spheres (centres at `height`) between consecutive edges [m3], shape (len(edges) - 1,).
+
+    The part of a sphere below a level at the fraction t of its diameter is t^2 (3 - 2 t).
+    """
+    t = np.clip((edges[None, :] - height[:, None]) / diameter[:, None] + 0.5, 0.0, 1.0)
+    below = t * t * (3.0 - 2.0 * t) * (np.pi / 6.0 * diameter[:, None] ** 3)
+    return np.diff(below.sum(axis=0))
+
+
+@dataclass(frozen=True)
+class GasDrag:
+    """Gas of `viscosity` [Pa s] and `density` [kg/m3], aerated at the superficial `velocity` [m/s]."""
+
+    powder: Powder
+    viscosity: float
+    density: float
+    velocity: float
+
+    def edges(self, top: float) -> np.ndarray:
+        """Edges of the slabs from the base to at least `top` [m]."""
+        return np.arange(0, int(top / (SLAB * self.powder.diameter)) + 2) * SLAB * self.powder.diameter
+
+    def coefficients(
+        self,
+        height: np.ndarray,
+        velocity: np.ndarray,
+        diameter: np.ndarray,
+        edges: np.ndarray,
+        solid: np.ndarray,
+    ) -> np.ndarray:
+        """gamma of f = gamma (j - u_z) for each particle [kg/s], shape (n,).
+
+        `solid`: solid fraction of the slabs, interpolated linearly between their centres; `velocity` normal to
+        the base enters the inertial part only.
+        """
+        centres = 0.5 * (edges[1:] + edges[:-1])
+        porosity = 1.0 - np.clip(np.interp(height, centres, solid), 0.0, 0.7)
+        slip = (self.velocity - velocity) / porosity
+        volume = np.pi / 6.0 * diameter**3
+        gamma = np.empty_like(height)
+        for size in np.unique(diameter):  # the law is written for one diameter
+            one = diameter == size
+            solids = np.maximum(1.0 - porosity[one], 1e-3)
+            beta = gidaspow_beta(
+                1.0 - solids,
+                slip[one],
+                float(size),
+                self.powder.sphericity,
+                self.viscosity,
+                self.density,
+                *self.powder.ergun,
+            )
+            gamma[one] = volume[one] * beta / ((1.0 - solids) ** 2 * solids)
+        return gamma

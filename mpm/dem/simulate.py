@@ -1,0 +1,208 @@
+"""One seed of a powder file: fill, settle, shake, record; restartable at the end of every cycle."""
+
+import io
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mpm.errors import InputError
+from mpm.files import write_atomically
+
+from .base import FLAT, Base, Filling, fit_length, frit_monolayer, loose_filling, sawtooth_baffle
+from .box import Box, BoxSpec, Particles
+from .case import DemCase
+from .gas import GasDrag, slab_solids
+from .relations import GRAVITY
+from .sampling import Recorder
+from .waveform import Waveform
+
+SETTLE_BLOCKS = 60  # of half the time a particle needs to fall its diameter, at most
+Progress = Callable[[float], None]  # called with the number of cycles done
+
+
+def build(case: DemCase, seed: int) -> tuple[BoxSpec, Filling]:
+    """The box of a powder file and its loose filling for one seed."""
+    powder, options = case.build_powder(), case.box
+    d = powder.diameter
+    diameters = case.diameters()
+    length, depth, base = options.length * d, options.depth * d, FLAT
+    if options.base != "flat":
+        length, depth = (fit_length(size, options.frit_diameter) for size in (length, depth))
+        base = _glued(case, length, depth)
+    filling = loose_filling(length, depth, options.height * d, diameters, base, seed)
+    launch = np.abs(case.build_waveform().velocity(np.linspace(0.0, 1.0, 4001))).max()
+    top = float(filling.positions[:, 2].max()) + 10.0 * d + 4.0 * launch**2 / GRAVITY
+    spec = BoxSpec(
+        powder,
+        diameters,
+        length,
+        depth,
+        top,
+        base,
+        options.stiffness,
+        options.cohesion,
+        options.steps_per_collision,
+    )
+    return spec, filling
+
+
+def _glued(case: DemCase, length: float, depth: float) -> Base:
+    options = case.box
+    if options.base == "frit":
+        return frit_monolayer(length, depth, options.frit_diameter)
+    return sawtooth_baffle(length, depth, options.frit_diameter, options.baffle_height, options.baffle_width)
+
+
+class Simulation:
+    """Runs one seed in `directory`; every rank of `comm` takes part, rank 0 records and writes."""
+
+    def __init__(self, case: DemCase, seed: int, directory: Path, comm: Any = None):
+        self.case, self.seed, self.directory, self.comm = case, seed, directory, comm
+        self.rank = comm.rank if comm is not None else 0
+        self.spec, self.filling = build(case, seed)
+        self.waveform: Waveform = case.build_waveform()
+        self.period = 1.0 / self.waveform.frequency
+        self.update = self.period / case.run.updates_per_cycle
+        self.steps = max(1, math.ceil(self.update / self.spec.largest_timestep()))
+        self.timestep = self.update / self.steps
+        powder, gas = self.spec.powder, case.gas
+        self.gas = GasDrag(powder, gas.viscosity, gas.density, gas.velocity) if gas is not None else None
+        fastest = float(np.abs(self.waveform.velocity(np.linspace(0.0, self.period, 4001))).max())
+        drop = math.sqrt(2.0 * GRAVITY * case.box.height * powder.diameter)
+        self.recorder = Recorder(
+            self.spec, 20.0 * (fastest + drop), lambda t: self.waveform.velocity(np.array([t]))[:, 0]
+        )
+
+    @property
+    def state_file(self) -> Path:
+        return self.directory / "state.npz"
+
+    def run(
+        self, resume: bool = False, progress: Progress = lambda done: None
+    ) -> dict[str, np.ndarray] | None:
+        """Simulate up to the case's number of cycles; returns the recorder's arrays on rank 0."""
+        if self.rank == 0:
+            self.directory.mkdir(parents=True, exist_ok=True)
+        saved = self._load() if resume else None
+        done = 0 if saved is None else int(saved["cycles"])
+        if saved is not None:
+            self.recorder.restore(saved)
+            if done >= self.case.run.cycles:
+                return self._cut(self.recorder.arrays()) if self.rank == 0 else None
+            start = Particles(saved["position"], saved["speed"], saved["spin"], saved["classes"])
+        else:
+            start = Particles.at_rest(self.filling.positions, self.filling.classes)
+        with Box(self.spec, start, self.timestep, self.directory, self.comm) as box:
+            if saved is None:
+                self._settle(box)
+                self._end_cycle(box, 0)
+            if self.gas is not None:
+                box.enable_drag()
+            every = self.case.run.dump_per_cycle
+            if every:
+                stride = max(1, self.case.run.updates_per_cycle // every) * self.steps
+                box.dump(self.directory / "trajectory.lammpstrj", stride, append=saved is not None)
+            for cycle in range(done, self.case.run.cycles):
+                self._cycle(box, cycle, progress)
+                self._end_cycle(box, cycle + 1)
+                progress(cycle + 1.0)
+        return self.recorder.arrays() if self.rank == 0 else None
+
+    def _settle(self, box: Box) -> None:
+        """Let the filling fall under gravity and viscous damping until it rests."""
+        d = self.spec.powder.diameter
+        fall = math.sqrt(d / GRAVITY)
+        box.accelerate(0.0, -GRAVITY)
+        box.set_damping(0.8 / fall)
+        block = max(1, round(0.5 * fall / self.timestep))
+        for _ in range(SETTLE_BLOCKS):
+            box.run(block)
+            state = box.snapshot()
+            rest = (
+                state is not None
+                and float(np.sqrt((state.velocity**2).sum(axis=1).mean())) < 0.005 * GRAVITY * fall
+            )
+            if self.comm is not None:
+                rest = self.comm.bcast(rest, root=0)
+            if rest:
+                break
+        box.set_damping(None)
+
+    def _cycle(self, box: Box, cycle: int, progress: Progress) -> None:
+        run = self.case.run
+        tilt = self.case.box.declination
+        gravity = np.array([GRAVITY * math.sin(tilt), -GRAVITY * math.cos(tilt)])
+        every = run.updates_per_cycle // run.samples_per_cycle
+        times = (cycle + np.arange(run.updates_per_cycle + 1) / run.updates_per_cycle) * self.period
+        # the mean acceleration of an interval: velocities of the base are exact at its ends
+        inertial = gravity[:, None] - np.diff(self.waveform.velocity(times), axis=1) / self.update
+        for i in range(run.updates_per_cycle):
+            box.accelerate(float(inertial[0, i]), float(inertial[1, i]))
+            if self.gas is not None:
+                self._refresh_drag(box, self.gas)
+            box.run(self.steps)
+            if (i + 1) % every == 0:
+                state = box.snapshot()
+                now = cycle + (i + 1) / run.updates_per_cycle
+                if state is not None:
+                    self.recorder.check(state, now)
+                    self.recorder.sample(float(times[i + 1]), state)
+                progress(now)
+
+    def _refresh_drag(self, box: Box, gas: GasDrag) -> None:
+        height, velocity, diameter = box.local_bed()
+        bed = box.local_is_bed()
+        edges = gas.edges(self.spec.height)
+        solid = slab_solids(height[bed], diameter[bed], edges)
+        if self.comm is not None:
+            solid = self.comm.allreduce(solid)
+        solid = solid / (self.spec.length * self.spec.depth * np.diff(edges))
+        gamma = np.zeros(len(height))
+        gamma[bed] = gas.coefficients(height[bed], velocity[bed], diameter[bed], edges, solid)
+        box.set_drag(gamma, gas.velocity)
+
+    # State ----------------------------------------------------------------------------------------
+
+    def _end_cycle(self, box: Box, cycles: int) -> None:
+        """Record the positions and write the state: particles, recorder, number of cycles."""
+        state = box.snapshot()
+        if state is None:
+            return
+        self.recorder.end_cycle(state)
+        stream = io.BytesIO()
+        np.savez(
+            stream,
+            **self.recorder.arrays(),
+            position=state.position,
+            speed=state.velocity,
+            spin=state.spin,
+            classes=state.classes,
+            cycles=np.array(cycles),
+            case=np.array(self.case.content_hash()),
+        )
+        write_atomically(self.state_file, stream.getvalue())
+
+    def _load(self) -> dict[str, np.ndarray] | None:
+        """The saved state, None when there is none. Every rank reads it."""
+        if not self.state_file.exists():
+            return None
+        with np.load(self.state_file) as archive:
+            saved = dict(archive)
+        if str(saved["case"]) != self.case.content_hash():
+            raise InputError(
+                f"{self.directory}: holds another powder file's run; only seeds, cycles, discard and the profile "
+                "may change on --resume"
+            )
+        return saved
+
+    def _cut(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Leave out cycles beyond the number that is asked for."""
+        cycles = self.case.run.cycles
+        samples = cycles * self.case.run.samples_per_cycle
+        return {
+            name: values if name == "edges" else values[: cycles + 1 if name == "cycle_end" else samples]
+            for name, values in arrays.items()
+        }
