@@ -1,0 +1,180 @@
+"""`mpm check`: the numbers of `mpm.engineering` for a case, and warnings about them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from mpm import engineering as eng
+from mpm.case import Case
+from mpm.chemistry import inlet_concentrations
+from mpm.dem.relations import (
+    minimum_fluidisation_velocity,
+    perfect_flight_velocity,
+    straight_drop_velocity,
+    wen_yu_minimum_fluidisation,
+)
+from mpm.geometry import Grid
+from mpm.layout import Inlet, Layer
+from mpm.motion import Vibration
+
+DILUTE = 0.02
+"""Mass fraction above which a feed is no longer dilute: the gas keeps the density and viscosity of its carrier."""
+
+
+def check_case(case: Case) -> dict[str, Any]:
+    """The numbers of a case, SI, as one JSON object; a number that does not exist for the case is absent."""
+    grid = Grid.from_case(case)
+    report: dict[str, Any] = {
+        "title": case.title,
+        "fidelity": case.fidelity,
+        "mesh": {
+            "columns": grid.columns,
+            "rows": grid.rows,
+            "cells": grid.cells,
+            "column_width": grid.dx,
+            "smallest_row": float(min(grid.dy)),
+        },
+        "run": {
+            "steps": eng.expected_steps(case),
+            "peak_memory_bytes": eng.expected_memory(grid.cells),
+            "flow_courant": eng.flow_courant(case, grid),
+        },
+        "gas": {
+            "density": case.gas.density,
+            "viscosity": case.gas.viscosity,
+            "molar_mass": case.gas.molar_mass,
+        },
+        "motion": _motion(case),
+        "inlets": {inlet.name: _inlet(case, inlet) for inlet in case.geometry.inlets},
+        "reactions": [str(r) for r in (*case.mechanism.surface_reactions, *case.mechanism.gas_reactions)],
+    }
+    bed = case.geometry.moving_layer
+    if bed is not None:
+        report["bed"] = _bed(case, bed)
+    report = _finite(report)
+    report["warnings"] = warnings(case, report)
+    return report
+
+
+def _finite(value: Any) -> Any:
+    """Drop None and numbers that are not finite."""
+    if isinstance(value, dict):
+        kept = {key: _finite(entry) for key, entry in value.items()}
+        return {key: entry for key, entry in kept.items() if entry is not None}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _motion(case: Case) -> dict[str, float | None]:
+    vibration = Vibration.from_motion(case.motion)
+    return {
+        "gamma": case.motion.gamma,
+        "frequency": case.motion.frequency,
+        "amplitude_x": vibration.ax,
+        "amplitude_y": vibration.ay,
+        "peak_velocity_x": vibration.ax * vibration.omega,
+        "peak_velocity_y": vibration.ay * vibration.omega,
+        "straight_drop": straight_drop_velocity(vibration.ax, case.motion.frequency),
+        "perfect_flight": perfect_flight_velocity(vibration.ax, case.motion.frequency),
+        "bed_velocity": case.motion.bed_velocity,
+    }
+
+
+def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
+    gas, bed = case.gas, case.geometry.moving_layer
+    numbers: dict[str, Any] = {
+        "velocity": inlet.velocity,
+        "flow": inlet.velocity * inlet.width,
+        "Re": eng.reynolds(gas.density, inlet.velocity, inlet.width, gas.viscosity),
+        "concentrations": inlet_concentrations(case.mechanism, gas, inlet.mass_fractions),
+    }
+    found = eng.inlet_excess(case, inlet)
+    if found is None or bed is None or bed.material is None:
+        return numbers
+    species, numbers["excess_number"], numbers["dose_ratio"] = found
+    material, reaction = bed.material, case.mechanism.half_reaction(species)
+    assert reaction is not None
+    k = float(reaction.rate_constant(gas.temperature, case.mechanism.get(species).molar_mass))
+    diffusivity = eng.effective_diffusivity(material, gas.diffusivity[species])
+    velocity = eng.rising_velocity(case, inlet.center)
+    surface = material.surface_to_volume
+    numbers["species"] = species
+    if diffusivity > 0.0:
+        numbers["Pe_bed"] = eng.peclet(velocity, bed.height, diffusivity)
+        numbers["Damkoehler_diffusion"] = eng.damkoehler_diffusion(surface, k, bed.height, diffusivity)
+    if k > 0.0:
+        numbers["front_thickness"] = eng.front_thickness(surface, k, diffusivity)
+        numbers["gas_lifetime"] = material.porosity / (surface * k)
+        per_site = k * numbers["concentrations"][species] * abs(reaction.nu_site[reaction.site])
+        numbers["site_lifetime"] = material.site_density / per_site
+    if velocity > 0.0:
+        numbers["Damkoehler_convection"] = eng.damkoehler_convection(surface, k, bed.height, velocity)
+    return numbers
+
+
+def _bed(case: Case, bed: Layer) -> dict[str, Any]:
+    gas, material, geometry = case.gas, bed.material, case.geometry
+    assert material is not None
+    rising = max(
+        (eng.rising_velocity(case, i.center) for i in geometry.inlets if i.side == "bottom"), default=0.0
+    )
+    numbers: dict[str, Any] = {
+        "height": bed.height,
+        "gas_velocity": rising,
+        "spreading_length": eng.spreading_length(case),
+        "pressure_drop": gas.viscosity * rising * bed.height / material.permeability[1],
+    }
+    if case.motion.bed_velocity > 0.0:
+        numbers["residence_time"] = geometry.length / case.motion.bed_velocity
+    if material.particle_diameter is not None:
+        numbers["Re_particle"] = eng.reynolds(gas.density, rising, material.particle_diameter, gas.viscosity)
+        if material.density is not None:
+            ergun = minimum_fluidisation_velocity(
+                material.particle_diameter,
+                material.sphericity,
+                material.density,
+                material.porosity,
+                gas.viscosity,
+                gas.density,
+            )
+            numbers["minimum_fluidisation_ergun"] = ergun
+            numbers["minimum_fluidisation_wen_yu"] = wen_yu_minimum_fluidisation(
+                material.particle_diameter, material.density, gas.viscosity, gas.density
+            )
+            numbers["gas_over_minimum_fluidisation"] = rising / ergun
+    return numbers
+
+
+def warnings(case: Case, report: dict[str, Any]) -> list[str]:
+    """What is legal but questionable, one sentence each."""
+    found = []
+    motion, bed = report["motion"], report.get("bed", {})
+    if case.motion.gamma > 0.0 and bed and case.motion.bed_velocity > motion["perfect_flight"]:
+        found.append(
+            f"the bed is conveyed at {case.motion.bed_velocity * 100:.3g} cm/s, above perfect flight, "
+            f"{motion['perfect_flight'] * 100:.3g} cm/s: no particle hops that fast"
+        )
+    ratio = bed.get("gas_over_minimum_fluidisation", 0.0)
+    if ratio > 1.0:
+        found.append(
+            f"gas rises through the bed at {bed['gas_velocity'] * 100:.3g} cm/s, {ratio:.2g} times minimum "
+            "fluidisation: the bed would not stay a porous solid"
+        )
+    for inlet in case.geometry.inlets:
+        feed = sum(inlet.mass_fractions.values())
+        if feed > DILUTE:
+            found.append(
+                f"inlet {inlet.name} feeds a mass fraction of {feed:.3g}, not dilute (above {DILUTE}): density and "
+                "viscosity stay those of the carrier"
+            )
+    courant = report["run"]["flow_courant"]
+    if courant > 1.0 and case.fidelity != "steady":
+        found.append(
+            f"the gas passes {courant:.2g} cells in a step of the cycle (CFL above 1): raise time.steps_per_cycle"
+        )
+    slide = case.motion.bed_velocity * case.time.step / report["mesh"]["column_width"]
+    if case.fidelity == "averaged" and bed and slide > 1.0:
+        found.append(f"the bed moves {slide:.2g} columns in a step: lower time.step to follow its front")
+    return found

@@ -1,0 +1,187 @@
+"""What an engineer works out on paper before running a case: each number one short function with its source.
+
+SI units throughout; velocities of gas are superficial. Conveying limits and minimum fluidisation are those of
+`mpm.dem.relations`, which the DEM substudy uses as well. `mpm check` prints these numbers for a case.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mpm.case import Case
+from mpm.chemistry import inlet_concentrations
+from mpm.geometry import Grid
+from mpm.layout import Inlet
+from mpm.materials import Material
+
+PEAK_MEMORY_BASE = 0.35e9
+"""Memory of one rank before it holds a mesh: interpreter, PETSc, MPI [bytes]."""
+PEAK_MEMORY_PER_CELL = 9e3
+"""Memory for each cell: flow factors, the stored cycle, transport operators, fields [bytes]."""
+
+
+def excess_number(
+    velocity: float,
+    width: float,
+    concentration: float,
+    bed_velocity: float,
+    bed_height: float,
+    surface_to_volume: float,
+    site_density: float,
+) -> float:
+    """Precursor molecules fed per surface site that passes, gamma = v w C / (u_bed h S n_s) (thesis, 5-20)."""
+    return velocity * width * concentration / (bed_velocity * bed_height * surface_to_volume * site_density)
+
+
+def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float] | None:
+    """Species, excess number and dose ratio of an inlet; None without a moving bed or a surface reaction.
+
+    The dose ratio is the excess number over what saturation needs: 1 molecule per site for TMA, 1.5 for water.
+    """
+    bed = case.geometry.moving_layer
+    if bed is None or bed.material is None or case.motion.bed_velocity == 0.0:
+        return None
+    sites = bed.material.surface_to_volume * bed.material.site_density
+    for species, concentration in inlet_concentrations(
+        case.mechanism, case.gas, inlet.mass_fractions
+    ).items():
+        reaction = case.mechanism.half_reaction(species)
+        if reaction is not None and concentration > 0.0 and sites > 0.0:
+            excess = excess_number(
+                inlet.velocity,
+                inlet.width,
+                concentration,
+                case.motion.bed_velocity,
+                bed.height,
+                bed.material.surface_to_volume,
+                bed.material.site_density,
+            )
+            return species, excess, excess / reaction.molecules_per_site
+    return None
+
+
+def reynolds(density: float, velocity: float, length: float, viscosity: float) -> float:
+    """Re = rho u l / mu."""
+    return density * velocity * length / viscosity
+
+
+def effective_diffusivity(material: Material, diffusivity: float, direction: int = 1) -> float:
+    """D_eff = porosity D / tau^2 [m2/s] along x (direction 0) or y (1); `diffusivity` in free gas."""
+    return material.porosity * diffusivity / material.tortuosity_factor[direction]
+
+
+def peclet(velocity: float, length: float, diffusivity: float) -> float:
+    """Pe = u l / D: convection over diffusion."""
+    return velocity * length / diffusivity
+
+
+def damkoehler_convection(
+    surface_to_volume: float, rate_constant: float, length: float, velocity: float
+) -> float:
+    """Da_I = S k l / u: reaction on fresh surface over convection along `length`."""
+    return surface_to_volume * rate_constant * length / velocity
+
+
+def damkoehler_diffusion(
+    surface_to_volume: float, rate_constant: float, length: float, diffusivity: float
+) -> float:
+    """Da_II = S k l^2 / D_eff: reaction on fresh surface over diffusion across `length`, the square of Thiele's modulus."""
+    return surface_to_volume * rate_constant * length**2 / diffusivity
+
+
+def front_thickness(surface_to_volume: float, rate_constant: float, diffusivity: float) -> float:
+    """sqrt(D_eff/(S k)) [m]: distance over which diffusing gas reacts away on fresh surface."""
+    return math.sqrt(diffusivity / (surface_to_volume * rate_constant))
+
+
+def flow_resistance(case: Case) -> float:
+    """Sum of h/k_y over the porous layers [1/m]: pressure drop over viscosity and superficial velocity (Darcy)."""
+    return sum(
+        layer.height / layer.material.permeability[1] for layer in case.geometry.layers if layer.material
+    )
+
+
+def spreading_length(case: Case) -> float:
+    """Distance lambda = sqrt(H^3 R / 12) [m] over which gas spreads in the plenum before it enters the porous layers.
+
+    Slot flow under a resistance: q = -(H^3/12 mu) dp/dx in the gas layers below (height H together) and
+    u = p/(mu R) through the porous ones give lambda^2 u'' = u - source. Far above the zone length, as in the
+    thesis' reactor (3.7 m), the gas rises evenly along the strip whatever the place of the ports.
+    """
+    height = 0.0
+    for layer in case.geometry.layers:
+        if layer.material is not None:
+            return math.sqrt(height**3 * flow_resistance(case) / 12.0)
+        height += layer.height
+    return math.inf
+
+
+def rising_velocity(case: Case, x: float) -> float:
+    """Estimated superficial velocity [m/s] at which gas enters the porous layers at position `x`.
+
+    Sum over the bottom inlets of the response to a line source with decay length `spreading_length`, in a periodic
+    or a closed strip; at most the fastest port velocity.
+    """
+    length, decay = case.geometry.length, spreading_length(case)
+    inlets = [inlet for inlet in case.geometry.inlets if inlet.side == "bottom"]
+    fastest = max((inlet.velocity for inlet in inlets), default=0.0)
+    total = sum(inlet.velocity * inlet.width for inlet in inlets)
+    if decay == 0.0:
+        return fastest
+    if decay > 1e3 * length:
+        return min(fastest, total / length)
+    velocity = 0.0
+    for inlet in inlets:
+        distance = abs(x - inlet.center)
+        images, period = [distance, length - distance], length
+        if not case.geometry.periodic:  # the walls mirror the inlet
+            images = [distance, 2 * length - distance, x + inlet.center, 2 * length - x - inlet.center]
+            period = 2 * length
+        shape = sum(math.exp(-image / decay) for image in images) / -math.expm1(-period / decay)
+        velocity += inlet.velocity * inlet.width * shape / (2.0 * decay)
+    return min(fastest, velocity)
+
+
+def courant(velocity: float, step: float, size: float) -> float:
+    """u dt / dx: cells passed in a step; the flow treats convection explicitly and wants it below 1."""
+    return abs(velocity) * step / size
+
+
+def flow_courant(case: Case, grid: Grid) -> float:
+    """Largest expected Courant number of the gas in a step of the vibration cycle.
+
+    Along x the gas layers lag the reactor by up to its peak horizontal velocity; along y gas passes ports and outlets.
+    """
+    from mpm.motion import Vibration
+
+    vibration, geometry = Vibration.from_motion(case.motion), case.geometry
+    step = 1.0 / (case.motion.frequency * case.time.steps_per_cycle)
+    flow = sum(inlet.velocity * inlet.width for inlet in geometry.inlets)
+    out = flow / sum(outlet.width for outlet in geometry.outlets) if geometry.outlets else 0.0
+    vertical = max([out, *(inlet.velocity for inlet in geometry.inlets)])
+    across = [
+        dy
+        for dy, layer in zip(grid.dy, grid.row_layer, strict=True)
+        if geometry.layers[layer].material is None
+    ]
+    return max(
+        courant(vibration.ax * vibration.omega, step, grid.dx),
+        courant(vertical, step, min(across)) if across else 0.0,
+    )
+
+
+def expected_steps(case: Case) -> int:
+    """Time steps of a run: `step` in averaged, `steps_per_cycle` from the start of the vibration in resolved, 0 in steady."""
+    time, motion = case.time, case.motion
+    if case.fidelity == "steady":
+        return 0
+    if case.fidelity == "averaged":
+        return math.ceil(time.end / time.step * (1.0 - 1e-12))
+    rate = motion.frequency * time.steps_per_cycle
+    before = min(motion.start, time.end)
+    return sum(math.ceil(span * rate * (1.0 - 1e-12)) for span in (before, time.end - before))
+
+
+def expected_memory(cells: int, ranks: int = 1) -> float:
+    """Peak memory [bytes] of a run over all ranks, from measurements on this program; good to a factor of 1.5."""
+    return ranks * PEAK_MEMORY_BASE + cells * PEAK_MEMORY_PER_CELL

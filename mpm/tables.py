@@ -1,0 +1,200 @@
+"""Tables for the terminal: what `mpm check`, `mpm mesh` and `mpm run` print."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from mpm.case import Case
+from mpm.geometry import Grid
+
+
+def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
+    """Print the case and its numbers as tables."""
+    mesh, run = report["mesh"], report["run"]
+    console.print(f"[bold]{case.title or 'case'}[/bold]: {case.fidelity}, to {case.time.end:g} s")
+    console.print(
+        f"{mesh['cells']:,} cells ({mesh['columns']} columns of {mesh['column_width'] * 1e3:.3g} mm, {mesh['rows']} rows), "
+        f"{run['steps']:,} steps, about {run['peak_memory_bytes'] / 1e9:.1f} GB, CFL {run['flow_courant']:.2g}"
+    )
+    console.print(
+        _layer_table(case),
+        _port_table(case, report),
+        _number_table(case, report),
+        *report["reactions"],
+        sep="\n",
+    )
+    for warning in report["warnings"]:
+        console.print(f"[yellow]warning:[/yellow] {warning}")
+
+
+def _layer_table(case: Case) -> Table:
+    table = Table(
+        "layer", "height [mm]", "rows", "material", "porosity", "k [um2]", "tau2", "S [1/m]", "sites [mol/m2]"
+    )
+    for layer in reversed(case.geometry.layers):
+        cells = [
+            layer.name + (" (moving)" if layer.moving else ""),
+            f"{layer.height * 1e3:g}",
+            str(layer.cells),
+        ]
+        material = layer.material
+        if material is None:
+            table.add_row(*cells, "gas")
+            continue
+        table.add_row(
+            *cells,
+            layer.material_name,
+            f"{material.porosity:g}",
+            _pair(k * 1e12 for k in material.permeability),
+            _pair(material.tortuosity_factor),
+            f"{material.surface_to_volume:g}",
+            f"{material.site_density:.3g}",
+        )
+    return table
+
+
+def _pair(values: Iterable[float]) -> str:
+    return " / ".join(dict.fromkeys(f"{value:.3g}" for value in values))
+
+
+def _port_table(case: Case, report: dict[str, Any]) -> Table:
+    table = Table(
+        "port",
+        "at [mm]",
+        "width [mm]",
+        "v [cm/s]",
+        "mass fractions",
+        "doses [s]",
+        "Re",
+        "excess",
+        "dose ratio",
+    )
+    for inlet in case.geometry.inlets:
+        numbers = report["inlets"][inlet.name]
+        feed = ", ".join(f"{name} {value:g}" for name, value in inlet.mass_fractions.items())
+        times = ", ".join(f"{a:g}-{b:g}" if b < math.inf else f"from {a:g}" for a, b in inlet.windows)
+        table.add_row(
+            inlet.name,
+            f"{inlet.center * 1e3:g}",
+            f"{inlet.width * 1e3:g}",
+            f"{inlet.velocity * 1e2:g}",
+            feed or case.gas.carrier,
+            times if feed else "",
+            f"{numbers['Re']:.3g}",
+            *(f"{numbers[key]:.3g}" if key in numbers else "" for key in ("excess_number", "dose_ratio")),
+        )
+    for outlet in case.geometry.outlets:
+        table.add_row(outlet.name, f"{outlet.center * 1e3:g}", f"{outlet.width * 1e3:g}", "", "outlet")
+    return table
+
+
+def _number_table(case: Case, report: dict[str, Any]) -> Table:
+    table = Table("quantity", "value", "unit")
+    motion, bed, gas = report["motion"], report.get("bed", {}), report["gas"]
+
+    def row(name: str, value: float | None, unit: str = "", scale: float = 1.0) -> None:
+        if value is not None:
+            table.add_row(name, f"{value * scale:.4g}", unit)
+
+    row("gas density", gas["density"], "kg/m3")
+    row("gas viscosity", gas["viscosity"], "Pa s")
+    row("amplitude, horizontal", motion["amplitude_x"], "mm", 1e3)
+    row("amplitude, vertical", motion["amplitude_y"], "mm", 1e3)
+    row("peak velocity, horizontal (perfect flight)", motion["perfect_flight"], "cm/s", 1e2)
+    row("peak velocity, vertical", motion["peak_velocity_y"], "cm/s", 1e2)
+    row("straight drop limit", motion["straight_drop"], "cm/s", 1e2)
+    row("bed velocity", motion["bed_velocity"], "cm/s", 1e2)
+    row("time of the bed in the strip", bed.get("residence_time"), "s")
+    row("gas rising through the bed, at most", bed.get("gas_velocity"), "cm/s", 1e2)
+    row("minimum fluidisation, Ergun", bed.get("minimum_fluidisation_ergun"), "cm/s", 1e2)
+    row("minimum fluidisation, Wen and Yu", bed.get("minimum_fluidisation_wen_yu"), "cm/s", 1e2)
+    row("gas velocity over minimum fluidisation", bed.get("gas_over_minimum_fluidisation"))
+    row("pressure drop of the bed", bed.get("pressure_drop"), "Pa")
+    row("Re of a particle", bed.get("Re_particle"))
+    for name, numbers in report["inlets"].items():
+        row(f"{name}: Pe through the bed", numbers.get("Pe_bed"))
+        row(f"{name}: Damkoehler, over convection", numbers.get("Damkoehler_convection"))
+        row(f"{name}: Damkoehler, over diffusion", numbers.get("Damkoehler_diffusion"))
+        row(f"{name}: reaction front", numbers.get("front_thickness"), "um", 1e6)
+        row(f"{name}: lifetime of a site", numbers.get("site_lifetime"), "us", 1e6)
+        row(f"{name}: lifetime in the gas", numbers.get("gas_lifetime"), "us", 1e6)
+    return table
+
+
+def print_mesh(case: Case, console: Console) -> None:
+    """Print layers, zones and ports of the mesh with their cells and facets."""
+    grid, geometry = Grid.from_case(case), case.geometry
+    regions = Table("region", "from [mm]", "to [mm]", "columns", "rows", "cells")
+    for layer in reversed(geometry.layers):
+        rows = grid.layer_rows(layer.name)
+        low, high = grid.y[rows.start], grid.y[rows.stop]
+        regions.add_row(
+            f"layer {layer.name}",
+            f"{low * 1e3:g}",
+            f"{high * 1e3:g}",
+            f"{grid.columns}",
+            f"{layer.cells}",
+            f"{grid.columns * layer.cells:,}",
+        )
+    for number, zone in enumerate(geometry.zones, start=1):
+        columns = int((grid.zone_of_column == number).sum())
+        regions.add_row(
+            f"zone {zone.name}",
+            f"{zone.start * 1e3:g}",
+            f"{zone.end * 1e3:g}",
+            f"{columns}",
+            f"{grid.rows}",
+            f"{columns * grid.rows:,}",
+        )
+    ports = Table("port", "side", "from [mm]", "to [mm]", "facets")
+    for kind, port in [*(("inlet", p) for p in geometry.inlets), *(("outlet", p) for p in geometry.outlets)]:
+        facets = int((grid.overlap(port) > 0.0).sum())
+        ports.add_row(
+            f"{kind} {port.name}", port.side, f"{port.x0 * 1e3:g}", f"{port.x1 * 1e3:g}", f"{facets}"
+        )
+    console.print(
+        regions, ports, f"{grid.cells:,} cells, {grid.columns} columns of {grid.dx * 1e3:.4g} mm", sep="\n"
+    )
+
+
+_SUMMARY = {
+    "excess_number": "excess number",
+    "dose_ratio": "dose ratio",
+    "titration": "titration",
+    "utilisation": "utilisation",
+    "flow": "flow",
+    "cvd": "CVD",
+}
+
+
+def print_summary(summary: dict[str, Any], console: Console) -> None:
+    """Print the figures of a summary that one looks at first, and the worst balance."""
+    table = Table("quantity", "of", "value")
+    for section, title in _SUMMARY.items():
+        for name, value in _numbers(summary.get(section, {})):
+            table.add_row(title, name, f"{value:.4g}")
+    console.print(table)
+    balances = [(name, value) for name, value in _numbers(summary) if name.endswith("balance_error")]
+    if balances:
+        worst, error = max(balances, key=lambda entry: abs(entry[1]))
+        console.print(f"worst balance: {error:.1e} ({worst.removesuffix(' balance_error')})")
+    counts = {
+        key: summary.get(key) for key in ("steps", "cells", "ranks", "simulated_seconds", "wall_seconds")
+    }
+    console.print(
+        ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in counts.items() if value is not None)
+    )
+
+
+def _numbers(table: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, float]]:
+    """Names and values of the single numbers in nested tables; profiles are left out."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _numbers(value, f"{prefix}{key} ")
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            yield f"{prefix}{key}", value
