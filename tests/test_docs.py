@@ -1,0 +1,55 @@
+"""What the documentation tells people to type works as printed."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpm.case import load_case
+from mpm.geometry import Grid
+from mpm.output import RunDirectory
+
+ROOT = Path(__file__).parent.parent
+
+
+def blocks(document: str, language: str) -> list[str]:
+    text = (ROOT / document).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+def test_first_case_of_the_readme_is_valid(tmp_path: Path) -> None:
+    """Fails when the case that a newcomer copies is refused, or does not do what its title says."""
+    (text,) = blocks("README.md", "toml")
+    (tmp_path / "wide_port.toml").write_text(text, encoding="utf-8")
+    case = load_case(tmp_path / "wide_port.toml", {"motion.bed_velocity": "0.8 cm/s"})
+    tma = next(inlet for inlet in case.geometry.inlets if inlet.name == "tma")
+    assert tma.width == pytest.approx(8e-3) and tma.mass_fractions == {"TMA": 1e-4}
+    assert case.geometry.length == pytest.approx(0.1397) and case.motion.bed_velocity == pytest.approx(0.008)
+
+
+def test_readers_of_the_documentation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when a printed way to read the results of `make demo` does not give the numbers that were written."""
+    pytest.importorskip("pyvista")
+    case = load_case("single_zone", {"geometry.cell_width": "4 mm"})
+    grid = Grid.from_case(case)
+    directory = RunDirectory(tmp_path / "results" / "single_zone")
+    directory.prepare()
+    directory.write_case(case.to_toml())
+    number = np.arange(grid.cells, dtype=float)
+    for step in range(81):
+        directory.write_fields(step / 4, grid, {"theta_OAl(CH3)2": number + step, "C_TMA": number * step})
+        directory.append_history({"time": step / 4, "balance.TMA": 1e-13 * step})
+    monkeypatch.chdir(tmp_path)
+    bed = (number + 80)[np.isin(np.arange(grid.cells) // grid.columns, range(21, 31))]
+    with_pyvista: dict = {}
+    with_mpm: dict = {}
+    with_numpy: dict = {}
+    for code, names in zip(
+        blocks("docs/output.md", "python"), (with_pyvista, with_mpm, with_numpy), strict=True
+    ):
+        exec(code, names)
+    assert with_pyvista["reader"].active_time_value == 20.0
+    assert np.array_equal(with_pyvista["bed"]["theta_OAl(CH3)2"], bed)
+    assert np.array_equal(with_mpm["bed"].ravel(), bed)
+    assert np.array_equal(with_numpy["concentration"], (number * 80).astype(np.float32))
