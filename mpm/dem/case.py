@@ -203,9 +203,14 @@ class BoxInput(Section):
 
 
 class GasInput(Section):
-    """Gas in the bed; `velocity` is the superficial aeration velocity relative to the base."""
+    """Gas in the bed, aerated from below at the superficial `velocity` in the frame where the inlet rests.
+
+    `frame = "lab"` is the seed's boundary condition (its inlet does not vibrate): the gas stands still while the
+    bed moves through it, which is what lifts fine powders. `"reactor"`: the gas column moves with the conveyor.
+    """
 
     velocity: Speed = 0.0
+    frame: Literal["lab", "reactor"] = "lab"
     viscosity: Viscosity = 18e-6
     molar_mass: MolarMass = 29e-3
     temperature: Temperature = 293.15

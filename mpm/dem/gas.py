@@ -1,7 +1,8 @@
 """Drag of the gas in the bed: uniform flux through slabs of local voidage (3-3 ... 3-9 in one dimension).
 
 The gas is incompressible and the box is periodic sideways, so the volume flux j normal to the base is the same at
-every height and equals the aeration velocity in the conveyor's frame. With eps grad p = -beta (u_g - u_s) the
+every height. In the conveyor's frame it is the aeration velocity, less the velocity of the base when the inlet
+rests in the lab. With eps grad p = -beta (u_g - u_s) the
 pressure and the drag term of (3-9) add up to the force on one particle
 
     f = V_p beta(eps)/(eps^2 (1 - eps)) (j - u_z),
@@ -31,12 +32,20 @@ def slab_solids(height: np.ndarray, diameter: np.ndarray, edges: np.ndarray) -> 
 
 @dataclass(frozen=True)
 class GasDrag:
-    """Gas of `viscosity` [Pa s] and `density` [kg/m3], aerated at the superficial `velocity` [m/s]."""
+    """Gas of `viscosity` [Pa s] and `density` [kg/m3], aerated at the superficial `velocity` [m/s].
+
+    `rests_in_lab`: the inlet does not move with the conveyor.
+    """
 
     powder: Powder
     viscosity: float
     density: float
     velocity: float
+    rests_in_lab: bool = True
+
+    def flux(self, base_velocity: float) -> float:
+        """Volume flux normal to the base in the conveyor's frame [m/s]."""
+        return self.velocity - base_velocity if self.rests_in_lab else self.velocity
 
     def edges(self, top: float) -> np.ndarray:
         """Edges of the slabs from the base to at least `top` [m]."""
@@ -45,19 +54,19 @@ class GasDrag:
     def coefficients(
         self,
         height: np.ndarray,
-        velocity: np.ndarray,
+        relative: np.ndarray,
         diameter: np.ndarray,
         edges: np.ndarray,
         solid: np.ndarray,
     ) -> np.ndarray:
         """gamma of f = gamma (j - u_z) for each particle [kg/s], shape (n,).
 
-        `solid`: solid fraction of the slabs, interpolated linearly between their centres; `velocity` normal to
-        the base enters the inertial part only.
+        `solid`: solid fraction of the slabs, interpolated linearly between their centres; `relative` = j - u_z
+        enters the inertial part only.
         """
         centres = 0.5 * (edges[1:] + edges[:-1])
         porosity = 1.0 - np.clip(np.interp(height, centres, solid), 0.0, 0.7)
-        slip = (self.velocity - velocity) / porosity
+        slip = relative / porosity
         volume = np.pi / 6.0 * diameter**3
         gamma = np.empty_like(height)
         for size in np.unique(diameter):  # the law is written for one diameter

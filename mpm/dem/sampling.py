@@ -27,7 +27,9 @@ def count_contacts(spec: BoxSpec, particles: Particles) -> tuple[int, int, float
     if spec.base.flat:
         on_base = position[:, 2] < radius
     else:
-        frit = cKDTree(np.mod(spec.base.positions, [spec.length, spec.depth, np.inf]), boxsize=period)
+        glued = spec.base.positions.copy()
+        glued[:, :2] %= size
+        frit = cKDTree(glued, boxsize=period)
         reach = float(radius.max()) + spec.base.diameter / 2.0
         links = tree.sparse_distance_matrix(frit, reach, output_type="coo_matrix")
         near = links.data < radius[links.row] + spec.base.diameter / 2.0

@@ -69,7 +69,11 @@ class Simulation:
         self.steps = max(1, math.ceil(self.update / self.spec.largest_timestep()))
         self.timestep = self.update / self.steps
         powder, gas = self.spec.powder, case.gas
-        self.gas = GasDrag(powder, gas.viscosity, gas.density, gas.velocity) if gas is not None else None
+        self.gas = (
+            None
+            if gas is None
+            else GasDrag(powder, gas.viscosity, gas.density, gas.velocity, gas.frame == "lab")
+        )
         fastest = float(np.abs(self.waveform.velocity(np.linspace(0.0, self.period, 4001))).max())
         drop = math.sqrt(2.0 * GRAVITY * case.box.height * powder.diameter)
         self.recorder = Recorder(
@@ -138,11 +142,12 @@ class Simulation:
         every = run.updates_per_cycle // run.samples_per_cycle
         times = (cycle + np.arange(run.updates_per_cycle + 1) / run.updates_per_cycle) * self.period
         # the mean acceleration of an interval: velocities of the base are exact at its ends
-        inertial = gravity[:, None] - np.diff(self.waveform.velocity(times), axis=1) / self.update
+        base = self.waveform.velocity(times)
+        inertial = gravity[:, None] - np.diff(base, axis=1) / self.update
         for i in range(run.updates_per_cycle):
             box.accelerate(float(inertial[0, i]), float(inertial[1, i]))
             if self.gas is not None:
-                self._refresh_drag(box, self.gas)
+                self._refresh_drag(box, self.gas, self.gas.flux(float(base[1, i : i + 2].mean())))
             box.run(self.steps)
             if (i + 1) % every == 0:
                 state = box.snapshot()
@@ -152,7 +157,7 @@ class Simulation:
                     self.recorder.sample(float(times[i + 1]), state)
                 progress(now)
 
-    def _refresh_drag(self, box: Box, gas: GasDrag) -> None:
+    def _refresh_drag(self, box: Box, gas: GasDrag, flux: float) -> None:
         height, velocity, diameter = box.local_bed()
         bed = box.local_is_bed()
         edges = gas.edges(self.spec.height)
@@ -161,8 +166,8 @@ class Simulation:
             solid = self.comm.allreduce(solid)
         solid = solid / (self.spec.length * self.spec.depth * np.diff(edges))
         gamma = np.zeros(len(height))
-        gamma[bed] = gas.coefficients(height[bed], velocity[bed], diameter[bed], edges, solid)
-        box.set_drag(gamma, gas.velocity)
+        gamma[bed] = gas.coefficients(height[bed], flux - velocity[bed], diameter[bed], edges, solid)
+        box.set_drag(gamma, flux)
 
     # State ----------------------------------------------------------------------------------------
 
@@ -172,17 +177,17 @@ class Simulation:
         if state is None:
             return
         self.recorder.end_cycle(state)
-        stream = io.BytesIO()
-        np.savez(
-            stream,
+        arrays: dict[str, Any] = {
             **self.recorder.arrays(),
-            position=state.position,
-            speed=state.velocity,
-            spin=state.spin,
-            classes=state.classes,
-            cycles=np.array(cycles),
-            case=np.array(self.case.content_hash()),
-        )
+            "position": state.position,
+            "speed": state.velocity,
+            "spin": state.spin,
+            "classes": state.classes,
+            "cycles": np.array(cycles),
+            "case": np.array(self.case.content_hash()),
+        }
+        stream = io.BytesIO()
+        np.savez(stream, **arrays)
         write_atomically(self.state_file, stream.getvalue())
 
     def _load(self) -> dict[str, np.ndarray] | None:
