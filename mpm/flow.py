@@ -26,7 +26,7 @@ from ufl import Form, avg, conditional, div, dot, dS, ds, dx, grad, inner, jump,
 from mpm.fem import PETSc, dolfinx
 from mpm.motion import StepMotion
 from mpm.parallel import largest, total
-from mpm.solvers import DirectSolver
+from mpm.solvers import DirectSolver, check
 from mpm.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 
 if TYPE_CHECKING:
@@ -165,6 +165,7 @@ class FlowProblem:
         self.inflow, self.frame_inflow = self._port_values()
         self._assemble()
         self._solvers: dict[str, DirectSolver] = {}
+        self._jacobian = None
 
     # --- set-up ---
 
@@ -288,6 +289,49 @@ class FlowProblem:
         solver.solve(rhs, self._work)
         self._adopt(self._work)
 
+    def steady_residual(self, motion: StepMotion, convective: PETSc.Vec | None = None) -> tuple[PETSc.Vec, float]:
+        """K x + N - f of the steady equations at the present state, and the size of f with the ports' share in it.
+
+        N is the convective force of the state unless another one is given, as the mean of a cycle is.
+        """
+        force = self._rhs
+        force.set(0.0)
+        force.axpy(motion.bed_velocity, self.entrainment)
+        force.axpy(motion.acceleration, self.acceleration)
+        scale = force.copy()
+        self._prescribe(scale, "steady", motion.frame_velocity_y)
+        size = scale.norm()
+        scale.destroy()
+        residual = self._work
+        self.steady_matrix.mult(self.vector, residual)
+        residual.axpy(1.0, self.convective_force() if convective is None else convective)
+        residual.axpy(-1.0, force)
+        residual.array[self._own_fixed] = 0.0
+        return residual, size
+
+    def newton_update(self, residual: PETSc.Vec) -> None:
+        """Subtract J^-1 residual from the state; J includes the derivative of the convection. Raises ConvergenceError."""
+        if self._jacobian is None:
+            self._jacobian = dolfinx.fem.form(self._jacobian_form)
+        matrix = dolfinx.fem.petsc.assemble_matrix(self._jacobian)
+        matrix.assemble()
+        matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
+        stokes = self._solver("steady")
+        ksp = PETSc.KSP().create(matrix.comm)
+        ksp.setType("fgmres")
+        ksp.setTolerances(rtol=1e-4, atol=0.0, max_it=200)
+        ksp.setOperators(matrix, stokes.matrix)
+        ksp.setPC(stokes.ksp.getPC())
+        ksp.setOperators(matrix, stokes.matrix)
+        ksp.setGMRESRestart(100)
+        ksp.solve(residual, self._fix)
+        check(ksp, "flow (Newton)")
+        self.state.x.array[: self._own] -= self._fix.array
+        self.state.x.scatter_forward()
+        stokes.ksp.setOperators(stokes.matrix)
+        ksp.destroy()
+        matrix.destroy()
+
     def _prescribe(self, rhs: PETSc.Vec, kind: str, frame_velocity_y: float) -> None:
         """Move the prescribed unknowns to the right-hand side."""
         values = self.ports(frame_velocity_y)[: self._own][self._own_fixed]
@@ -343,7 +387,7 @@ def face_flow(strip: Strip, velocities: Floats) -> FaceFlow:
 
 
 def boundary_flows(case: Case, strip: Strip, flow: FaceFlow) -> dict[str, float]:
-    """Volume flow through each port, positive into the strip [m2/s per metre of depth... m3/s/m]."""
+    """Volume flow through each port, positive into the strip [m2/s, that is m3/s per metre of depth]."""
     walls = {"bottom": flow.bottom, "top": -flow.top}
     grid = strip.grid
     flows = {}

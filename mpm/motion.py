@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from mpm.constants import GRAVITY
 from mpm.errors import InputError
 
 if TYPE_CHECKING:
     from mpm.case import Motion
 
 Floats = NDArray[np.float64]
-GRAVITY = 9.81  # m/s2, the value behind the seed's printed velocities
+
 TURN = 2.0 * np.pi
 
 

@@ -1,0 +1,136 @@
+"""Velocity fields of a run: at rest, the mean of a cycle, and the cycle itself.
+
+The gas does not feel the dilute species, so its flow is found first and replayed: `resolved` uses one field per phase of the periodic
+cycle, `averaged` its mean, both after the field at rest. An impulsive start marches the true transient instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.errors import ConvergenceError
+from mpm.fem import PETSc
+from mpm.flow import FlowProblem
+from mpm.motion import REST, BedMotion, StepMotion, step_motion
+from mpm.parallel import largest
+from mpm.solvers import check
+
+Floats = NDArray[np.float64]
+NEWTON_LIMIT = 25
+STEADY = 1e-9  # residual of the steady flow, relative to its forcing (rounding of the drag leaves 1e-10)
+PERIODIC = 1e-6  # change of the velocities from one cycle to the next, relative to the fastest
+CYCLE_LIMIT = 200
+
+
+@dataclass(frozen=True, eq=False)
+class FlowField:
+    """Velocities at the bottom, left, right and top of every local cell (4, cells) [m/s] and pressure (cells,) [Pa]."""
+
+    velocities: Floats
+    pressure: Floats
+
+    @classmethod
+    def of(cls, problem: FlowProblem) -> FlowField:
+        return cls(problem.velocities(), problem.pressure().copy())
+
+
+def mean_field(fields: list[FlowField]) -> FlowField:
+    return FlowField(
+        np.mean([f.velocities for f in fields], axis=0), np.mean([f.pressure for f in fields], axis=0)
+    )
+
+
+def cycle_motions(bed: BedMotion, dt: float, phases: int) -> list[StepMotion]:
+    """Forcing of each step of a cycle in the periodic state (the second cycle: the first begins at the start of the motion)."""
+    offset = bed.vibration.period if phases > 1 else 0.0
+    return [step_motion(bed, offset + k * dt, offset + (k + 1) * dt) for k in range(phases)]
+
+
+def mean_motion(bed: BedMotion) -> StepMotion:
+    """Forcing averaged over a cycle: the frame's means vanish, the bed's mean velocity remains."""
+    return StepMotion(bed.mean, 0.0, 0.0, 0.0)
+
+
+def steady_flow(problem: FlowProblem, motion: StepMotion = REST) -> FlowField:
+    """Steady flow with convection under constant forcing; leaves it in `problem.state`.
+
+    Newton's method; the linear systems by GMRES with the factored Stokes-Darcy operator as preconditioner, so one factor serves.
+    Raises ConvergenceError.
+    """
+    force = problem.convective_force()
+    force.set(0.0)
+    problem.settle(motion, force)
+    scale = None
+    for _ in range(NEWTON_LIMIT):
+        residual, size = problem.steady_residual(motion)
+        scale = max(size, 1e-300) if scale is None else scale
+        worst = residual.norm() / scale
+        if worst < STEADY:
+            return FlowField.of(problem)
+        if not np.isfinite(worst):
+            break
+        problem.newton_update(residual)
+    raise ConvergenceError(
+        f"steady flow: Newton stopped after {NEWTON_LIMIT} iterations at a residual of {worst:.3g} of the forcing; "
+        "the flow may have no steady state: try fidelity resolved with startup impulsive"
+    )
+
+
+def periodic_flow(
+    problem: FlowProblem, bed: BedMotion, phases: int, watch: Callable[[int, float], None] | None = None
+) -> list[FlowField]:
+    """The cycle that the flow repeats, one field per step; `problem.dt` is a cycle over `phases`.
+
+    Marches from the steady flow under the mean forcing. Summed over a periodic cycle of backward Euler the storage cancels, so the
+    cycle's mean satisfies the steady equations with the cycle's mean convection. What it lacks after a cycle is the slow start-up drift
+    of the headspace (about 0.7 s): a Newton step on those equations removes it at once, where marching would take 100 cycles.
+    Periodicity is judged on velocities alone. `watch(cycle, change)` is called after every cycle. Raises ConvergenceError after CYCLE_LIMIT cycles.
+    """
+    motions = cycle_motions(bed, problem.dt, phases)
+    steady_flow(problem, mean_motion(bed))
+    if phases == 1:
+        return [FlowField.of(problem)]
+    mean = StepMotion(
+        float(np.mean([m.bed_velocity for m in motions])),
+        float(np.mean([m.acceleration for m in motions])),
+        float(np.mean([m.frame_velocity_y for m in motions])),
+        0.0,
+    )
+    previous: list[Floats] = []
+    for cycle in range(CYCLE_LIMIT):
+        fields: list[FlowField] = []
+        convective_mean = problem.convective_force().duplicate()
+        state_mean = np.zeros_like(problem.state.x.array)
+        for motion in motions:
+            force = problem.convective_force()
+            convective_mean.axpy(1.0 / phases, force)
+            problem.step(motion, force)
+            state_mean += problem.state.x.array / phases
+            fields.append(FlowField.of(problem))
+        change = _change(problem, previous, fields)
+        if watch is not None:
+            watch(cycle, change)
+        if change < PERIODIC:
+            return fields
+        previous = [f.velocities for f in fields]
+        last = problem.state.x.array.copy()
+        problem.state.x.array[:] = state_mean
+        residual, _ = problem.steady_residual(mean, convective_mean)
+        problem.newton_update(residual)
+        problem.state.x.array[:] += last - state_mean
+        convective_mean.destroy()
+    raise ConvergenceError(f"periodic flow: velocities still change by {change:.3g} per cycle after {CYCLE_LIMIT} cycles")
+
+
+def _change(problem: FlowProblem, previous: list[Floats], fields: list[FlowField]) -> float:
+    """Largest change of a velocity since the cycle before, over the largest velocity."""
+    if not previous:
+        return float("inf")
+    change = max(np.abs(f.velocities - p).max(initial=0.0) for f, p in zip(fields, previous, strict=True))
+    speed = max(np.abs(f.velocities).max(initial=0.0) for f in fields)
+    change, speed = largest(problem.strip.comm, [change, speed])
+    return float(change / speed) if speed > 0.0 else 0.0

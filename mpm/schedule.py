@@ -1,0 +1,85 @@
+"""The steps of a run: those before the vibration starts, and those on the grid of its cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil, floor
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mpm.case import Case
+
+RESTING = -1
+SLACK = 1e-9  # of a step or an output interval: times that agree to this are equal
+
+
+@dataclass(frozen=True)
+class Step:
+    """One time step from `t0` to `t1` [s]; `phase` numbers it within its cycle, RESTING before the vibration starts.
+
+    `since` [s] is its beginning counted from the start of the vibration.
+    """
+
+    index: int
+    t0: float
+    t1: float
+    phase: int
+    since: float
+
+    @property
+    def dt(self) -> float:
+        return self.t1 - self.t0
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Equal steps of `dt` [s] from the start of the vibration on, `phases` of them per cycle (1: every step is alike).
+
+    Before the start the steps are as equal as they can be and not longer than `dt`, so that the cycle's grid stays aligned. The run
+    ends with the first step that reaches `end`.
+    """
+
+    dt: float
+    phases: int
+    start: float
+    end: float
+
+    @classmethod
+    def from_case(cls, case: Case) -> Schedule:
+        if case.fidelity == "resolved":
+            n = case.time.steps_per_cycle
+            phases = n if case.motion.gamma > 0.0 else 1
+            return cls(1.0 / case.motion.frequency / n, phases, case.motion.start, case.time.end)
+        return cls(case.time.step, 1, case.motion.start, case.time.end)
+
+    @property
+    def resting_steps(self) -> int:
+        """Steps before the vibration starts, were the run long enough."""
+        return ceil(self.start / self.dt - SLACK)
+
+    @property
+    def steps(self) -> int:
+        """Steps of the whole run."""
+        rest = self.resting_steps
+        if self.end <= self.start * (1.0 + SLACK) and rest:
+            return ceil(self.end / (self.start / rest) - SLACK)
+        return rest + max(ceil((self.end - self.start) / self.dt - SLACK), 0)
+
+    def step(self, index: int) -> Step:
+        """Step `index`, counted from 0."""
+        rest = self.resting_steps
+        if index < rest:
+            dt = self.start / rest
+            return Step(index, index * dt, (index + 1) * dt, RESTING, index * dt - self.start)
+        k = index - rest
+        return Step(index, self.start + k * self.dt, self.start + (k + 1) * self.dt, k % self.phases, k * self.dt)
+
+    def from_step(self, index: int) -> Iterator[Step]:
+        """All steps from `index` on."""
+        return (self.step(n) for n in range(index, self.steps))
+
+    def is_output(self, step: Step, every: float) -> bool:
+        """True when `step` is the last one or reaches a multiple of `every` [s]."""
+        last = step.index == self.steps - 1
+        return last or floor(step.t1 / every + SLACK) > floor(step.t0 / every + SLACK)
