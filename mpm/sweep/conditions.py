@@ -66,10 +66,11 @@ class Condition:
             case ast.BoolOp(values=parts) | ast.List(elts=parts) | ast.Tuple(elts=parts):
                 for part in parts:
                     self._check(part)
-            case ast.BinOp(op=op) | ast.UnaryOp(op=op) if type(op) in OPERATIONS:
-                for part in ast.iter_child_nodes(node):
-                    if not isinstance(part, ast.operator | ast.unaryop):
-                        self._check(part)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATIONS:
+                self._check(left)
+                self._check(right)
+            case ast.UnaryOp(op=op, operand=operand) if type(op) in OPERATIONS:
+                self._check(operand)
             case ast.Compare(left=left, ops=ops, comparators=rest) if all(
                 type(op) in OPERATIONS for op in ops
             ):

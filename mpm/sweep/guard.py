@@ -19,6 +19,7 @@ import ctypes
 import fcntl
 import json
 import os
+import re
 import select
 import signal
 import socket
@@ -103,6 +104,14 @@ def supervise(command: list[str], log: str, lock: TextIO, grace: float) -> int:
     return status if status >= 0 else 128 - status
 
 
+def killed_rank(log: str, status: int) -> int:
+    """Status of a run under mpirun: MPICH's, for a rank that a signal ended, is the bare number of the signal."""
+    with open(log, "rb") as stream:
+        stream.seek(max(0, os.path.getsize(log) - 10_000))
+        found = re.search(rb"EXIT STRING: .*\(signal (\d+)\)", stream.read())
+    return 128 + int(found.group(1)) if found and status else status
+
+
 def write_record(path: str, record: dict[str, Any]) -> None:
     """Replace the point's verdict in one step (`mpm.files` is out of reach here: no package is imported)."""
     with open(path + ".tmp", "w") as stream:
@@ -122,6 +131,8 @@ def main(order: dict[str, Any]) -> int:
     started = time.time()
     clock = time.monotonic()
     status = supervise(order["command"], order["log"], lock, order["grace"])
+    if order["about"]["ranks"] > 1:
+        status = killed_rank(order["log"], status)
     seconds = time.monotonic() - clock
     record = {"exit_status": status, "started": started, "seconds": seconds, "host": socket.gethostname()}
     write_record(order["record"], order["about"] | record)

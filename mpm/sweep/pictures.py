@@ -93,15 +93,17 @@ def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: st
     field = np.full((len(rows), len(columns)), np.nan)
     field[np.searchsorted(rows, y.positions), np.searchsorted(columns, x.positions)] = values
     axes = figure.add_subplot()
+    dress(axes, "x", x)
+    dress(axes, "y", y)
     axes.patch.set(hatch="////", facecolor="0.85", edgecolor="0.6")
     field = np.ma.masked_invalid(field)
-    mesh = axes.pcolormesh(edges(columns, x.logarithmic), edges(rows, y.logarithmic), field, cmap="viridis")
+    across, up = edges(columns, x.logarithmic), edges(rows, y.logarithmic)
+    mesh = axes.pcolormesh(across, up, field, cmap="viridis")
     figure.colorbar(mesh, ax=axes, label=label)
     if not (x.words or y.words) and np.ptp(field.compressed()) > 0:
         lines = axes.contour(columns, rows, field, colors="white", linewidths=0.8)
         axes.clabel(lines, fontsize="small")
-    dress(axes, "x", x)
-    dress(axes, "y", y)
+    axes.set(xlim=across[[0, -1]], ylim=up[[0, -1]])
 
 
 def parallel_coordinates(figure: "Figure", scales: Sequence[Scale], values: np.ndarray, label: str) -> None:

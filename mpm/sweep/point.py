@@ -50,7 +50,7 @@ PATIENCE = 60.0
 """Seconds to wait for a point's lock: its last owner may be within its grace."""
 STALE_FORM = re.compile(r"JIT compilation timed out.*remove (\S+\.c)\)")
 LAUNCHER_LINE = re.compile(
-    r"=|\[(proxy|mpiexec)|Abort\(|application called MPI_Abort|YOUR APPLICATION|This typically"
+    r"=|\[(proxy|mpiexec)|Abort\(|application called MPI_Abort|YOUR APPLICATION|This typically|Please see the FAQ"
 )
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 

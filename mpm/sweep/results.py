@@ -13,7 +13,7 @@ from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.plan import Point
 from mpm.sweep.point import error_of, program, status_of
 from mpm.sweep.quantities import to_number
-from mpm.sweep.sweepfile import Sweep
+from mpm.sweep.sweepfile import DEFAULT_COLUMNS, Sweep
 from mpm.sweep.table import Row, choose, flatten, unit_of, write_csv, write_parquet
 
 PACKAGES = (
@@ -56,7 +56,8 @@ class Results:
         steady = self.sweep.base.fidelity == "steady"
         available = [name for numbers in self._numbers.values() for name in numbers]
         chosen = choose(self.sweep.columns, available)
-        axes = {axis.name: axis.si_unit for axis in self.sweep.axes}
+        kinds = zip(self.sweep.axes, self.points[0].numbers, strict=True)
+        axes = {axis.name: "" if isinstance(one, str) else axis.si_unit or "1" for axis, one in kinds}
         numbers = {name: unit_of(name, steady) for name in chosen if name not in axes}
         return {**axes, "status": "", **numbers, "error": "", "point": ""}
 
@@ -84,7 +85,9 @@ class Results:
         return Counter(state for name, state in states.items() if name not in to_run)
 
     def missing_columns(self) -> list[str]:
-        """Columns asked for by their full name that no finished point has."""
+        """Columns that the sweep file asks for by their full name and no finished point has."""
+        if self.sweep.columns == DEFAULT_COLUMNS:
+            return []
         known = {name for numbers in self._numbers.values() for name in numbers}
         return [name for name in choose(self.sweep.columns, ()) if known and name not in known]
 
@@ -93,7 +96,7 @@ class Results:
         rows, columns = self.rows(), self.columns()
         write_csv(self.layout.root / "results.csv", columns, rows)
         write_atomically(
-            self.layout.root / "sweep.json", json.dumps(provenance(self) | about, indent=1) + "\n"
+            self.layout.root / "sweep.json", json.dumps(provenance(self) | dict(about), indent=1) + "\n"
         )
         return write_parquet(self.layout.root / "results.parquet", columns, rows, {"title": self.sweep.title})
 

@@ -132,13 +132,14 @@ def load_sweep(directory: str | Path) -> "xr.Dataset | pd.DataFrame":
         raise InputError.at(
             directory, "", "no sweep", "a directory that `mpm sweep` wrote, with sweep.json and results.csv"
         )
-    words = ["status", "error", "point", *(axis["name"] for axis in about["axes"] if axis["kind"] == "word")]
-    frame = pd.read_csv(
-        table,
-        float_precision="round_trip",
-        keep_default_na=False,
-        na_values={column: [""] for column in about["columns"] if column not in words},
-        dtype=dict.fromkeys(words, str),
+    words = {"status", "error", "point", *(axis["name"] for axis in about["axes"] if axis["kind"] == "word")}
+    with table.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    frame = pd.DataFrame(
+        {
+            column: [row[column] if column in words else float(row[column] or "nan") for row in rows]
+            for column in about["columns"]
+        }
     )
     units = {column: item["unit"] for column, item in about["columns"].items() if item["unit"]}
     attributes = {key: about[key] for key in ("title", "case", "program", "mode")}

@@ -1,0 +1,177 @@
+"""Sweeps beyond one machine: a real Dask scheduler and workers on loopback, and Slurm's commands played by scripts."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from mpm.sweep.cluster import slurm_options
+from mpm.sweep.lease import Lease, Watch
+
+pytest.importorskip("distributed", reason="needs the extra sweep")
+
+SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s")
+
+
+@pytest.fixture
+def dask(bench):
+    """`dask(2)`: address of a scheduler on loopback and the processes of that many workers, one point at a time each."""
+    processes = []
+
+    def start(*command: str) -> subprocess.Popen:
+        process = subprocess.Popen(
+            [sys.executable, "-m", *command],
+            env=bench.variables,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        processes.append(process)
+        return process
+
+    def cluster(workers: int) -> tuple[str, list[subprocess.Popen]]:
+        import distributed
+
+        file = bench.path / "scheduler.json"
+        where = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
+        start("distributed.cli.dask_scheduler", *where)
+        bench.wait_for(lambda: file.exists() and file.stat().st_size > 0)
+        how = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1"]
+        how += ["--local-directory", str(bench.path), "--scheduler-file", str(file)]
+        started = [start("distributed.cli.dask_worker", *how) for _ in range(workers)]
+        with distributed.Client(scheduler_file=str(file), set_as_default=False) as client:
+            client.wait_for_workers(workers, timeout=60)
+            return client.scheduler.address, started
+
+    yield cluster
+    for process in reversed(processes):
+        process.kill()
+        process.wait()
+
+
+def test_dask_with_a_killed_worker_gives_the_local_table(bench, dask):
+    """Fails when a point of the killed worker is lost, a finished one repeated, or the tables differ in a byte."""
+    bench.delay = 1.0
+    bench.sweep("[0.1, 0.2, 0.3, 0.77]", SPEEDS)
+    address, workers = dask(2)
+    driver = bench.start(scheduler=address)
+
+    def in_the_middle() -> bool:
+        steps = bench.names("step")
+        return len(bench.events("stop")) >= 3 and sum(2 <= count <= 10 for count in steps.values()) == 2
+
+    bench.wait_for(in_the_middle)
+    workers[0].send_signal(signal.SIGKILL)
+    workers[0].wait()
+    finished = set(bench.names("stop"))
+    _, messages = driver.communicate(timeout=120)
+    assert driver.returncode == 0, messages
+    starts = bench.names("start")
+    assert max(starts.values()) == 2, "the worker was not in the middle of a point"
+    assert all(starts[name] == 1 for name in finished)
+    assert set(bench.names("step").values()) == {20}, (
+        "the interrupted point did not go on from its restart state"
+    )
+    (bench.path / "events").unlink()
+    assert bench.run("local")[0] == 0
+    assert Counter(bench.table("local").status) == {"done": 9, "failed": 3}
+    assert bench.text() == bench.text("local")
+
+
+def test_an_interrupted_dask_sweep_stops_its_points_on_the_workers(bench, dask):
+    """Fails when workers go on computing for a driver that was stopped, or the next call does not go on."""
+    bench.delay = 2.0
+    bench.sweep("[0.1, 0.2, 0.3]")
+    address, _ = dask(2)
+    driver = bench.start(scheduler=address)
+    bench.wait_for(lambda: len(bench.events("step")) > 10)
+    driver.send_signal(signal.SIGINT)
+    _, messages = driver.communicate(timeout=30)
+    assert driver.returncode == 130, messages
+    assert not any(bench.alive(int(event[1])) for event in bench.events("start"))
+    assert Counter(bench.table().status) == {"interrupted": 2, "pending": 1}
+    assert bench.run(scheduler=address)[0] == 0
+    assert set(bench.names("step").values()) == {20}
+
+
+def test_an_address_without_a_scheduler_is_one_line(bench):
+    """Fails when a wrong address ends in a traceback."""
+    bench.sweep("[0.1]")
+    status, messages = bench.run(scheduler="tcp://127.0.0.1:1")
+    assert status == 2
+    assert "--scheduler: found 'tcp://127.0.0.1:1'" in messages.splitlines()[-1]
+    assert "Traceback" not in messages
+
+
+def test_a_driver_that_fell_silent_has_left(tmp_path):
+    """Fails when a point on another machine would outlive its driver, or one with a living driver be stopped."""
+    with Lease(tmp_path / "lease") as lease:
+        watch = Watch(lease.path, lease.token, expiry=3.0)
+        assert not watch.ended()
+        looks = [watch.ended() for _ in range(8)]  # 3 s are 6 looks without news
+        assert looks == [False] * 6 + [True] * 2
+        assert Watch(lease.path, "another driver's").ended()
+        watch = Watch(lease.path, lease.token)
+    assert watch.ended(), "a driver that has ended says so"
+
+
+SBATCH = """#!{python}
+import os, subprocess, sys
+job = subprocess.Popen(["bash", sys.argv[-1]], start_new_session=True, stdin=subprocess.DEVNULL,
+                       stdout=open(os.environ["JOBS"] + "/output", "a"), stderr=subprocess.STDOUT)
+open(os.environ["JOBS"] + "/" + str(job.pid), "w").write(open(sys.argv[-1]).read())
+print("Submitted batch job", job.pid)
+"""
+SCANCEL = """#!{python}
+import os, signal, sys
+for job in sys.argv[1:]:
+    try:
+        os.killpg(int(job), signal.SIGTERM)
+    except ProcessLookupError:
+        pass
+"""
+
+
+def test_slurm_runs_the_sweep_in_its_jobs(bench):
+    """sbatch and scancel are scripts that start and end processes here. Fails when job scripts do not run points."""
+    commands, jobs = bench.path / "bin", bench.path / "jobs"
+    commands.mkdir()
+    jobs.mkdir()
+    for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
+        (commands / name).write_text(text.format(python=sys.executable))
+        (commands / name).chmod(0o755)
+    bench.environment = {"PATH": f"{commands}:{os.environ['PATH']}", "JOBS": str(jobs)}
+    bench.sweep(
+        "[0.1, 0.2, 0.3, 0.4]", tail='[sweep.slurm]\nworkers = 2\nqueue = "short"\ninterface = "lo"\n'
+    )
+    status, messages = bench.run(scheduler="slurm")
+    assert status == 0, messages
+    assert set(bench.table().status) == {"done"} and "2 Slurm jobs" in messages
+    scripts = [file for file in jobs.iterdir() if file.name != "output"]
+    assert len(scripts) == 2
+    assert (
+        "#SBATCH -p short" in scripts[0].read_text() and "#SBATCH --cpus-per-task=1" in scripts[0].read_text()
+    )
+    bench.wait_for(lambda: not any(bench.alive(int(file.name)) for file in scripts), 10.0)
+
+
+def test_slurm_options_ask_for_points_times_ranks():
+    """Fails when a job gets fewer processors than its points have ranks, or our own keys reach dask-jobqueue."""
+    options = slurm_options({"workers": 3, "points_per_job": 4, "walltime": "01:00:00"}, 2, Path("log"))
+    assert (options["cores"], options["job_cpu"], options["processes"]) == (4, 8, 1)
+    assert options["walltime"] == "01:00:00" and options["memory"] == "32 GB"
+    assert not {"workers", "points_per_job"} & set(options)
+
+
+def test_wrong_slurm_options_are_one_line(bench):
+    """Fails when an option that dask-jobqueue does not know ends in a traceback."""
+    bench.sweep("[0.1]", tail='[sweep.slurm]\nqueu = "short"\n')
+    started = time.monotonic()
+    status, messages = bench.run(scheduler="slurm")
+    assert status == 2 and time.monotonic() - started < 30
+    assert "sweep.slurm" in messages.splitlines()[-1] and "queu" in messages.splitlines()[-1]

@@ -1,0 +1,297 @@
+"""Sweep files and their points: values, sampling, conditions, names, messages. Starts no process, needs no solver."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mpm.case import load_case
+from mpm.errors import InputError
+from mpm.sweep.conditions import Condition
+from mpm.sweep.plan import plan
+from mpm.sweep.quantities import Range, to_number, unit_as_written
+from mpm.sweep.sweepfile import read_sweep
+
+TMA = "geometry.inlet.tma.mass_fractions.TMA"
+
+
+def sweep_file(directory: Path, body: str, head: str = "") -> Path:
+    file = directory / "sweep.toml"
+    file.write_text(f'[sweep]\ncase = "single_zone"\n{head}\n{body}')
+    return file
+
+
+def axis(key: str, values: str, more: str = "") -> str:
+    return f'[[sweep.axis]]\nkey = "{key}"\n{values}\n{more}\n'
+
+
+@pytest.mark.parametrize(
+    ("value", "number", "unit", "written"),
+    [
+        ("3.5 cm/s", 0.035, "m/s", "cm/s"),
+        ("0.34mm", 3.4e-4, "m", "mm"),
+        ("4.25 um^2", 4.25e-12, "m^2", "um^2"),
+        ("60 deg", math.pi / 3, "rad", "deg"),
+        ("100 degC", 373.15, "K", "K"),
+        (2e-4, 2e-4, "", ""),
+        ("thesis", "thesis", "", ""),
+        (True, "true", "", ""),
+    ],
+)
+def test_values_become_si_numbers_as_in_a_case(value, number, unit, written):
+    """Fails when a table would show another number than the case computes with, or a wrong unit."""
+    found, found_unit = to_number(value)
+    assert found == (number if isinstance(number, str) else pytest.approx(number, rel=1e-15))
+    assert (found_unit, unit_as_written(value)) == (unit, written)
+
+
+def test_ranges_keep_the_unit_of_their_start_and_short_decimals():
+    """Fails when refining a range renames its old points (0.30000000000000004) or ends are missed."""
+    assert Range("1 mm", "0.5 cm", False).levels(5) == ("1.0 mm", "2.0 mm", "3.0 mm", "4.0 mm", "5.0 mm")
+    assert Range(1e-4, 1e-2, True).levels(3) == (1e-4, 1e-3, 1e-2)
+    coarse, fine = Range(0.0, 0.6, False).levels(4), Range(0.0, 0.6, False).levels(7)
+    assert set(coarse) < set(fine)
+
+
+def test_a_grid_runs_through_its_last_axis_first_and_names_points_by_content(tmp_path):
+    """Fails when order or overrides are wrong, or a name depends on how a value is written."""
+    body = axis(TMA, "values = [1e-4, 2e-4]") + axis(
+        "motion.bed_velocity", 'linspace = { start = "0.5 cm/s", stop = "3 cm/s", num = 3 }', 'name = "speed"'
+    )
+    points = plan(read_sweep(sweep_file(tmp_path, body + '[sweep.set]\n"time.end" = "3 s"\n')))
+    assert [point.numbers for point in points][:4] == [
+        (1e-4, 0.005),
+        (1e-4, 0.0175),
+        (1e-4, 0.03),
+        (2e-4, 0.005),
+    ]
+    assert [point.case.motion.bed_velocity for point in points][:3] == [0.005, 0.0175, 0.03]
+    same = load_case("single_zone", {TMA: 2e-4, "motion.bed_velocity": "5 mm/s", "time.end": "3000 ms"})
+    assert points[3].name == same.content_hash()[:12]
+    assert len({point.name for point in points}) == 6
+
+
+def test_unquoted_fixed_overrides_are_the_same_as_quoted_ones(tmp_path):
+    """Fails when TOML's nested reading of `time.end = ...` is not taken for the dotted key."""
+    body = axis("motion.gamma", "values = [0.3]")
+    quoted = plan(read_sweep(sweep_file(tmp_path, body + '[sweep.set]\n"time.end" = "3 s"\n')))
+    nested = plan(read_sweep(sweep_file(tmp_path, body + '[sweep.set]\ntime.end = "3 s"\n')))
+    assert quoted[0].name == nested[0].name
+    assert nested[0].case.time.end == 3.0
+
+
+def test_one_axis_can_set_several_keys(tmp_path):
+    """Fails when only the first of the keys follows the axis."""
+    body = (
+        '[[sweep.axis]]\nname = "width"\nkey = ["geometry.inlet.tma.width", "geometry.inlet.purge.width"]\n'
+    )
+    (point,) = plan(read_sweep(sweep_file(tmp_path, body + 'values = ["2.2 mm"]\n')))
+    assert {inlet.width for inlet in point.case.geometry.inlets} == {0.0022}
+
+
+def test_zip_pairs_the_levels(tmp_path):
+    """Fails when zip multiplies axes out, or accepts axes of different length."""
+    body = axis("motion.gamma", "values = [0.3, 0.4]") + axis(
+        "motion.frequency", 'values = ["16 Hz", "20 Hz"]'
+    )
+    points = plan(read_sweep(sweep_file(tmp_path, body, 'mode = "zip"')))
+    assert [point.numbers for point in points] == [(0.3, 16.0), (0.4, 20.0)]
+    body = body.replace('"20 Hz"', '"20 Hz", "24 Hz"')
+    with pytest.raises(InputError, match=r"mode zip with motion.gamma: 2, motion.frequency: 3 values"):
+        read_sweep(sweep_file(tmp_path, body, 'mode = "zip"'))
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
+def test_samples_fill_their_ranges_evenly(tmp_path, method):
+    """Fails when a sixteenth of either axis (a stratum of both methods) holds other than one sample."""
+    body = axis(TMA, "logspace = { start = 1e-4, stop = 1e-2 }") + axis(
+        "motion.bed_velocity", 'linspace = { start = "0.5 cm/s", stop = "3 cm/s" }'
+    )
+    sweep = read_sweep(sweep_file(tmp_path, body, f'mode = "sample"\nsamples = 16\nmethod = "{method}"'))
+    points = plan(sweep)
+    for place, scaled in enumerate((lambda y: math.log10(y) / 2 + 2, lambda v: (v - 0.005) / 0.025)):
+        strata = sorted(int(16 * scaled(point.numbers[place])) for point in points)
+        assert strata == list(range(16))
+    assert [point.name for point in plan(sweep)] == [point.name for point in points]
+
+
+def test_a_longer_sobol_sample_contains_the_shorter_one(tmp_path):
+    """Fails when extending a sample would compute its points anew."""
+    body = axis("motion.gamma", "linspace = { start = 0.1, stop = 0.6 }")
+    names = {
+        samples: {
+            p.name
+            for p in plan(read_sweep(sweep_file(tmp_path, body, f'mode = "sample"\nsamples = {samples}')))
+        }
+        for samples in (8, 12)
+    }
+    assert names[8] < names[12]
+
+
+def test_a_listed_axis_is_sampled_from_its_list(tmp_path):
+    """Fails when sample mode invents values between listed ones."""
+    body = axis("motion.gamma", "values = [0.3, 0.6]")
+    points = plan(read_sweep(sweep_file(tmp_path, body, 'mode = "sample"\nsamples = 8')))
+    assert sorted({point.numbers[0] for point in points}) == [0.3, 0.6]
+
+
+def test_conditions_drop_combinations(tmp_path):
+    """Fails when a condition is read in other units than SI or keeps the wrong side."""
+    body = axis("geometry.inlet.tma.width", 'values = ["2 mm", "4 mm"]', 'name = "width"') + axis(
+        "geometry.layer.bed.height", 'values = ["2 mm", "3 mm", "6 mm"]', 'name = "height"'
+    )
+    sweep = read_sweep(sweep_file(tmp_path, body, "where = [\"width <= height and not height > '5 mm'\"]"))
+    assert [point.numbers for point in plan(sweep)] == [(0.002, 0.002), (0.002, 0.003)]
+
+
+def test_conditions_evaluate_and_nothing_else():
+    """Fails when arithmetic is wrong, or an expression could call or reach into anything."""
+    assert Condition("0.001 < width <= 2 * height", ("width", "height")).holds(
+        {"width": 0.004, "height": 0.002}
+    )
+    assert Condition("profile in ['thesis', 'phases']", ("profile",)).holds({"profile": "thesis"})
+    for text in (
+        "__import__('os')",
+        "width.real",
+        "width[0]",
+        "(lambda: 1)()",
+        "[x for x in width]",
+        "width := 2",
+    ):
+        with pytest.raises(InputError):
+            Condition(text, ("width",))
+    with pytest.raises(
+        InputError, match=r"unknown name widht; accepted: width, height \(did you mean width\?\)"
+    ):
+        Condition("widht > 1", ("width", "height"))
+
+
+def test_a_point_that_the_case_refuses_is_in_the_plan_with_its_error(tmp_path):
+    """Fails when one impossible combination would stop the others, or lose its reason."""
+    body = axis("geometry.inlet.tma.center", 'values = ["104.775 mm", "300 mm"]')
+    good, bad = plan(read_sweep(sweep_file(tmp_path, body)))
+    assert good.case is not None and good.error == ""
+    assert bad.case is None and "geometry.inlet.tma" in bad.error and "\n" not in bad.error
+
+
+BROKEN = {
+    "no axis": ("", "", "sweep.axis: found nothing"),
+    "unknown key": (
+        axis("motion.gamma", "values = [1]"),
+        'mod = "grid"',
+        "sweep.mod: found an unknown key.*mean mode",
+    ),
+    "unknown axis key": (axis("motion.gamma", "valuess = [1]"), "", r"sweep.axis\[0\].valuess.*mean values"),
+    "unknown mode": (
+        axis("motion.gamma", "values = [1]"),
+        'mode = "gird"',
+        "sweep.mode: found 'gird'.*mean grid",
+    ),
+    "unknown case key": (
+        axis("motion.gama", "values = [0.3]"),
+        "",
+        r"motion.gama: found an unknown key.*mean gamma",
+    ),
+    "wrong dimension": (
+        axis("motion.bed_velocity", 'values = ["1 mm"]'),
+        "",
+        "motion.bed_velocity: found '1 mm'",
+    ),
+    "no unit": (
+        axis("motion.bed_velocity", "values = [0.01]"),
+        "",
+        "motion.bed_velocity: found 0.01 without a unit",
+    ),
+    "mixed dimensions": (
+        axis("motion.bed_velocity", 'values = ["1 mm", "1 s"]'),
+        "",
+        r"\(units m, s\).*one dimension",
+    ),
+    "no such inlet": (axis("geometry.inlet.tmma.width", 'values = ["4 mm"]'), "", "tmma.*mean tma"),
+    "exponents": (
+        axis(TMA, "logspace = { start = -4, stop = -2, num = 3 }"),
+        "",
+        "logspace takes the positive end",
+    ),
+    "no num": (
+        axis("motion.gamma", "linspace = { start = 0.3, stop = 0.6 }"),
+        "",
+        "linspace .motion.gamma..num",
+    ),
+    "no values": (axis("motion.gamma", ""), "", "no values; accepted: one of values, linspace, logspace"),
+    "no samples": (axis("motion.gamma", "values = [1]"), 'mode = "sample"', "sweep.samples: found nothing"),
+    "a key twice": (
+        axis("motion.gamma", "values = [1]") * 2,
+        "",
+        "motion.gamma is also in axis motion.gamma",
+    ),
+    "axis and set": (
+        axis("motion.gamma", "values = [1]") + '[sweep.set]\n"motion.gamma" = 1\n',
+        "",
+        "motion.gamma is also in sweep.set",
+    ),
+    "bad override": (
+        axis("motion.gamma", "values = [1]") + '[sweep.set]\n"time.end" = "10 mm"\n',
+        "",
+        "sweep.case with sweep.set: .*time.end: found '10 mm'",
+    ),
+    "drops all": (
+        axis("motion.gamma", "values = [1]", 'name = "g"'),
+        'where = ["g > 2"]',
+        "drops all 1 combinations",
+    ),
+    "bad condition": (
+        axis("motion.gamma", "values = [1]", 'name = "g"'),
+        'where = ["g >"]',
+        "sweep.where: 'g >' is not",
+    ),
+    "words": (
+        axis("motion.gamma", "values = [1]", 'name = "g"'),
+        "where = [\"g > 'x'\"]",
+        "cannot be evaluated",
+    ),
+    "not TOML": ("[[sweep.axis]", "", "not TOML"),
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_broken_sweep_file_gives_one_line_that_names_file_and_key(tmp_path, what):
+    """Fails when the message is missing, has several lines, or does not say where and what."""
+    body, head, message = BROKEN[what]
+    file = sweep_file(tmp_path, body, head)
+    with pytest.raises(InputError, match=message) as caught:
+        plan(read_sweep(file))
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_case_given_as_a_sweep_is_told_apart(tmp_path):
+    """Fails when a case file, or no file, ends in a traceback."""
+    case = tmp_path / "case.toml"
+    case.write_text('title = "a case"\n')
+    with pytest.raises(InputError, match="is this a case"):
+        read_sweep(case)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_sweep(tmp_path / "absent.toml")
+
+
+def test_planning_imports_neither_mpi_nor_the_solver(tmp_path):
+    """Fails when the driver could initialise MPI: then its children would be taken for ranks of its job."""
+    file = sweep_file(tmp_path, axis("motion.gamma", "values = [0.3]"))
+    code = (
+        "import sys; from mpm.sweep import run_sweep; from mpm.sweep.plan import plan; "
+        f"from mpm.sweep.sweepfile import read_sweep; plan(read_sweep({str(file)!r})); "
+        "print({'mpi4py', 'dolfinx', 'dolfinx_solver', 'petsc4py', 'gmsh', 'pyvista', 'lammps'} & set(sys.modules))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "set()"
+
+
+@pytest.mark.parametrize(
+    "file", sorted(Path(__file__).parents[2].glob("cases/sweeps/*.toml")), ids=lambda file: file.stem
+)
+def test_shipped_sweeps_can_be_planned(file):
+    """Fails when a shipped sweep does not fit the shipped cases, or one of its points is refused."""
+    assert all(point.case is not None for point in plan(read_sweep(file)))

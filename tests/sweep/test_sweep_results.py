@@ -1,0 +1,67 @@
+"""What a sweep leaves: the table in its three forms, `load_sweep`, pictures."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import mpm
+
+SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
+
+
+def test_load_sweep_returns_a_grid_with_units(bench):
+    """Fails when values sit at wrong coordinates, units are lost, or a failed point is a number."""
+    bench.sweep(
+        "[0.3, 0.77]", SPEEDS[:3], more='title = "speeds"\nwhere = ["gamma < 0.5 or speed < \'1 cm/s\'"]'
+    )
+    assert bench.run()[0] == 0
+    data = mpm.load_sweep(bench.path / "out")
+    assert dict(data.sizes) == {"gamma": 2, "speed": 3}
+    assert data.speed.attrs["units"] == "m/s" and data["cvd.rate_mean"].attrs["units"] == "mol/m^3/s"
+    assert data["titration.tma.exit_mean"].sel(gamma=0.3, speed=0.013).item() == 0.3 * 0.013
+    assert data.status.sel(gamma=0.77).values.tolist() == ["failed", "", ""]
+    assert np.isnan(data["cvd.rate_mean"].sel(gamma=0.77)).all()
+    assert data.attrs["title"] == "speeds" and data.attrs["program"].startswith("mpm ")
+
+
+def test_load_sweep_returns_samples_as_a_frame(bench):
+    """Fails when a sample's frame differs from the table, or csv, parquet and provenance disagree."""
+    bench.sweep("[0.1, 0.2]", SPEEDS, more='mode = "sample"\nsamples = 4')
+    assert bench.run()[0] == 0
+    frame = mpm.load_sweep(bench.path / "out")
+    assert len(frame) == 4 and frame.attrs["units"]["speed"] == "m/s"
+    parquet = pd.read_parquet(bench.path / "out" / "results.parquet")
+    assert list(parquet.columns) == list(frame.columns)
+    for column in frame.columns:
+        assert frame[column].tolist() == parquet[column].tolist()
+    import pyarrow.parquet
+
+    schema = pyarrow.parquet.read_schema(bench.path / "out" / "results.parquet")
+    assert schema.field("speed").metadata == {b"unit": b"m/s"}
+    about = json.loads((bench.path / "out" / "sweep.json").read_text())
+    assert about["counts"] == {"done": 4} and about["columns"]["speed"]["unit"] == "m/s"
+    assert about["text"] == (bench.path / "sweep.toml").read_text()
+    with pytest.raises(mpm.InputError, match="no sweep"):
+        mpm.load_sweep(bench.path)
+
+
+@pytest.mark.parametrize(
+    ("gammas", "speeds", "more"),
+    [
+        ("[0.1, 0.2, 0.77]", SPEEDS[:1], ""),
+        ("[0.1, 0.2, 0.77]", SPEEDS[:3], ""),
+        ("[0.1, 0.2]", SPEEDS[:2], 'mode = "zip"'),
+        ("[0.1, 0.2, 0.4]", SPEEDS, 'mode = "sample"\nsamples = 4'),
+    ],
+    ids=["lines", "map", "zip", "parallel"],
+)
+def test_pictures(bench, gammas, speeds, more):
+    """Fails when a kind of sweep, or a failed point in it, gives no picture."""
+    bench.delay = 0.0
+    bench.sweep(gammas, speeds, more=f'{more}\npictures = ["cvd.*"]')
+    status, messages = bench.run()
+    assert status == 0, messages
+    (picture,) = (bench.path / "out" / "plots").glob("*.png")
+    assert picture.name == "cvd.rate_mean.png" and picture.stat().st_size > 5000
