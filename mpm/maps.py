@@ -81,7 +81,8 @@ def map_figure(
     strip.set_aspect(stretch)
     scale = "to scale" if stretch == 1 else f"height stretched {stretch} times"
     title = run.case.title or run.directory.path.resolve().name
-    strip.set_title(f"{title}, t = {snapshot.time:.4g} s ({scale})", pad=22 + LINE, fontsize=10)
+    when = "steady state" if run.case.fidelity == "steady" else f"t = {snapshot.time:.4g} s"
+    strip.set_title(f"{title}, {when} ({scale})", pad=22 + LINE, fontsize=10)
     strip.set_facecolor("#f2f2f2")
     draw_layers(strip, run.case, grid, height * stretch)
     draw_ports(strip, run.case)
