@@ -57,10 +57,11 @@ def run_sweep(
     tries them again; 130: interrupted. InputError for a broken sweep file, before anything is written.
     """
     sweep = read_sweep(path)
-    ranks = ranks or sweep.ranks
+    ranks = sweep.ranks if ranks is None else ranks
+    for option, number in (("--jobs", jobs), ("--ranks", ranks)):
+        if number is not None and number < 1:
+            raise InputError.at(None, option, str(number), "a whole number of at least 1")
     jobs = jobs or max(1, len(os.sched_getaffinity(0)) // ranks)
-    if jobs < 1 or ranks < 1:
-        raise InputError.at(None, "--jobs, --ranks", f"{jobs}, {ranks}", "whole numbers of at least 1")
     if ranks > 1 and not command:
         mpirun()
     points = plan(sweep)

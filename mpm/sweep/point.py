@@ -104,7 +104,7 @@ def command(task: Task, resume: bool) -> list[str]:
     """The full command of a point."""
     layout = Layout(Path(task.root))
     launcher = [mpirun(), "-n", str(task.ranks)] if task.ranks > 1 else []
-    what = task.command or (sys.executable, "-m", "mpm", "run")
+    what = task.command or (sys.executable, "-m", "mpm", "run", "--quiet")
     where = [str(layout.case(task.name)), "-o", str(layout.run(task.name))]
     return [*launcher, *what, *where, "--resume" if resume else "--overwrite"]
 

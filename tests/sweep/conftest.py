@@ -84,8 +84,14 @@ class Bench:
     started: list[subprocess.Popen[str]] = field(default_factory=list)
 
     def sweep(
-        self, gammas: str, speeds: tuple[str, ...] = ("0.5 cm/s",), more: str = "", tail: str = ""
+        self,
+        gammas: str,
+        speeds: tuple[str, ...] = ("0.5 cm/s",),
+        more: str = "",
+        tail: str = "",
+        pictures: str = "",
     ) -> None:
+        more += f"\npictures = {json.dumps([pictures] if pictures else [])}"
         (self.path / "sweep.toml").write_text(
             f'[sweep]\ncase = "single_zone"\n{more}\n'
             f'[[sweep.axis]]\nkey = "motion.gamma"\nname = "gamma"\nvalues = {gammas}\n'

@@ -60,7 +60,7 @@ def test_load_sweep_returns_samples_as_a_frame(bench):
 def test_pictures(bench, gammas, speeds, more):
     """Fails when a kind of sweep, or a failed point in it, gives no picture."""
     bench.delay = 0.0
-    bench.sweep(gammas, speeds, more=f'{more}\npictures = ["cvd.*"]')
+    bench.sweep(gammas, speeds, more, pictures="cvd.*")
     status, messages = bench.run()
     assert status == 0, messages
     (picture,) = (bench.path / "out" / "plots").glob("*.png")
