@@ -42,6 +42,8 @@ from mpm.units import (
     Velocity,
     Viscosity,
     reject,
+    worked_out,
+    write_defaults,
 )
 
 __all__ = [
@@ -83,10 +85,10 @@ class Gas(Frozen):
     carrier: str = "N2"
     temperature: Temperature = 473.0
     pressure: Pressure = 101325.0
-    molar_mass: MolarMass = 0.0
-    viscosity: Viscosity = 0.0
-    density: Density = 0.0
-    diffusivity: SpeciesDiffusivity = Field({})
+    molar_mass: MolarMass = worked_out()
+    viscosity: Viscosity = worked_out()
+    density: Density = worked_out()
+    diffusivity: SpeciesDiffusivity = worked_out({})
 
     @model_validator(mode="after")
     def _fill_in(self) -> Self:
@@ -318,7 +320,7 @@ def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, An
 
 def case_schema() -> dict[str, Any]:
     """JSON Schema of a case file, for editors."""
-    schema = Case.model_json_schema(by_alias=True)
+    schema = write_defaults(Case.model_json_schema(by_alias=True))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -203,7 +203,7 @@ def _insert_materials(data: Table, source: str) -> None:
         if not isinstance(name, str):
             continue
         if name not in given and name not in BUILT_IN:
-            known = [*given, *BUILT_IN]
+            known = list(dict.fromkeys((*given, *BUILT_IN)))
             raise InputError.at(
                 source,
                 f"geometry.layer.{layer.get('name', '?')}.material",

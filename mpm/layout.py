@@ -38,7 +38,11 @@ from mpm.units import (
     Speed,
     describe,
     reject,
+    worked_out,
 )
+
+MOST_CELLS = 100_000_000
+"""A mesh beyond this is a slip of the unit, not a plan."""
 
 _INSTANT = Dimension("s", "a time", "5 s", at_least=0.0)
 _DEADLINE = Dimension("s", "a time", "5 s", above=0.0, infinite=True)
@@ -141,8 +145,8 @@ class Inlet(_Port):
     velocity: Speed = 0.035
     mass_fractions: dict[str, Fraction] = {}
     start: Instant = 0.0
-    stop: Deadline = math.inf
-    windows: Windows = ()
+    stop: Deadline = worked_out(math.inf)
+    windows: Windows = worked_out(())
 
     @model_validator(mode="after")
     def _one_form_of_windows(self) -> Self:
@@ -213,7 +217,9 @@ class Geometry(Frozen):
     layers: tuple[Layer, ...] = Field(alias="layer", min_length=1)
     inlets: tuple[Inlet, ...] = Field((), alias="inlet")
     outlets: tuple[Outlet, ...] = Field((), alias="outlet")
-    zones: tuple[Zone, ...] = Field((), alias="zone")
+    zones: tuple[Zone, ...] = Field(
+        (), alias="zone", description="default: as many equal zones as dosing inlets"
+    )
 
     @property
     def columns(self) -> int:
@@ -236,6 +242,9 @@ class Geometry(Frozen):
             raise reject(
                 f"{self.columns} columns", "at least 3 columns in a periodic strip", key="cell_width"
             )
+        cells = self.columns * sum(layer.cells for layer in self.layers)
+        if cells > MOST_CELLS:
+            raise reject(f"{cells:.2g} cells", f"a mesh of at most {MOST_CELLS:.0e} cells", key="cell_width")
         _check_names("layer", self.layers)
         _check_names("port", (*self.inlets, *self.outlets))
         _check_names("zone", self.zones)

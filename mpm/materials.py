@@ -26,6 +26,7 @@ from mpm.units import (
     Positive,
     describe,
     reject,
+    worked_out,
 )
 
 SITE_DENSITIES = {
@@ -77,7 +78,7 @@ _Sites = Annotated[
     float,
     BeforeValidator(_site_density),
     PlainSerializer(_SITES.write, when_used="json"),
-    WithJsonSchema({"type": "string", "examples": [_SITES.example, *SITE_DENSITIES]}),
+    WithJsonSchema({"type": "string", "examples": [_SITES.example, *SITE_DENSITIES], "unit": _SITES.unit}),
 ]
 
 
@@ -99,11 +100,11 @@ class Material(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_nothing_required)
 
     porosity: Porosity
-    permeability: _PairOfAreas = (0.0, 0.0)
-    tortuosity_factor: _PairOfNumbers = (0.0, 0.0)
-    surface_to_volume: PerLength = -1.0
+    permeability: _PairOfAreas = worked_out((0.0, 0.0))
+    tortuosity_factor: _PairOfNumbers = worked_out((0.0, 0.0))
+    surface_to_volume: PerLength = worked_out()
     site_density: _Sites = SITE_DENSITIES["thesis"]
-    initial_coverage: dict[str, Fraction] = {}
+    initial_coverage: dict[str, Fraction] = worked_out({})
     viscosity_ratio: Positive = 1.0
     density: Density | None = None
     particle_diameter: Length | None = None

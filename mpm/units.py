@@ -14,7 +14,7 @@ from decimal import Decimal
 from functools import cache, lru_cache
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 _NUMBER = re.compile(
@@ -157,6 +157,7 @@ class Dimension:
                 "type": "string",
                 "description": f"{self.accepted}; SI unit {self.unit}",
                 "examples": [self.example],
+                "unit": self.unit,
                 "pattern": r"^\s*[+-]?([0-9]|\.[0-9]|inf).*[^0-9.\s]\S*\s*$",
             }
         bounds = {
@@ -170,6 +171,26 @@ class Dimension:
             "description": self.accepted,
             **{k: v for k, v in bounds.items() if v is not None},
         }
+
+
+def worked_out(placeholder: Any = 0.0) -> Any:
+    """Default of a field that its model works out from others when it is left out; no default for the schema."""
+    return Field(placeholder, json_schema_extra=_without_default)
+
+
+def _without_default(schema: dict[str, Any]) -> None:
+    schema.pop("default", None)
+
+
+def write_defaults(schema: Any) -> Any:
+    """Return a JSON Schema in which defaults of dimensional values stand as a case file would write them."""
+    if isinstance(schema, dict):
+        schema = {key: write_defaults(value) for key, value in schema.items()}
+        if "unit" in schema and isinstance(schema.get("default"), float):
+            schema["default"] = f"{schema['default']!r} {schema['unit']}"
+    elif isinstance(schema, list):
+        schema = [write_defaults(entry) for entry in schema]
+    return schema
 
 
 def describe(value: Any) -> str:

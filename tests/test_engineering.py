@@ -1,0 +1,154 @@
+"""Engineering numbers against the thesis and the classic correlations, and the warnings of `mpm check`."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from mpm import engineering as eng
+from mpm.case import Case, load_case
+from mpm.check import check_case
+from mpm.cli import main
+
+EXAMPLE = Path(__file__).parent / "example_case.toml"
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return load_case(EXAMPLE)
+
+
+@pytest.mark.parametrize(
+    ("width", "mass_fraction", "velocity", "expected"),
+    [  # equation 5-20, tabulated independently of mpm
+        (4.0, 1e-4, 3.5, 0.895505),
+        (4.0, 2e-4, 3.5, 1.79112),
+        (4.0, 1e-3, 3.5, 8.95998),
+        (4.0, 1e-2, 3.5, 90.0959),
+        (2.25, 2e-4, 3.5, 1.0075),
+        (4.5, 1e-4, 4.0, 1.15129),
+    ],
+)
+def test_excess_number(
+    case: Case, width: float, mass_fraction: float, velocity: float, expected: float
+) -> None:
+    changed = case.with_(
+        {
+            "geometry.inlet.tma.width": f"{width} mm",
+            "geometry.inlet.tma.velocity": f"{velocity} cm/s",
+            "geometry.inlet.tma.mass_fractions.TMA": mass_fraction,
+        }
+    )
+    found = eng.inlet_excess(changed, changed.geometry.inlets[1])
+    assert found is not None
+    species, excess, ratio = found
+    assert species == "TMA"
+    assert excess == pytest.approx(expected, rel=3e-4)
+    assert ratio == excess
+
+
+def test_dose_ratio_of_water_counts_three_molecules_for_two_sites() -> None:
+    cycle = load_case("single_cycle")
+    found = {i.name: eng.inlet_excess(cycle, i) for i in cycle.geometry.inlets}
+    assert found["purge1"] is None and found["purge2"] is None
+    tma, water = found["tma"], found["water"]
+    assert tma is not None and water is not None
+    assert water[1] / water[2] == 1.5
+    assert water[2] == pytest.approx(tma[2], rel=1e-3)  # the stoichiometric pair
+
+
+def test_gas_spreads_in_the_plenum(case: Case) -> None:
+    """Spreading length 3.7 m against a strip of 0.14 m: gas rises evenly. A tight plenum keeps it over the port."""
+    even = (2 * 0.035 * 4e-3) / 0.1397
+    assert eng.spreading_length(case) == pytest.approx(3.654, rel=1e-3)
+    assert eng.rising_velocity(case, 0.1048) == pytest.approx(even, rel=1e-3)
+    tight = case.with_({"geometry.layer.plenum.height": "0.1 mm"})
+    decay = eng.spreading_length(tight)
+    assert decay == pytest.approx(math.sqrt(1e-12 * eng.flow_resistance(tight) / 12.0), rel=1e-12)
+    assert eng.rising_velocity(tight, 0.1048) == pytest.approx(0.035 * 4e-3 / (2 * decay), rel=0.01)
+    assert eng.rising_velocity(tight, 0.07) < 0.2 * eng.rising_velocity(tight, 0.1048)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_rising_gas_is_all_the_gas_that_is_fed(case: Case, periodic: bool) -> None:
+    """Integrated over the strip the estimate returns the inlets' flow, whatever the spreading length."""
+    changed = case.with_({"geometry.periodic": periodic, "geometry.layer.plenum.height": "0.5 mm"})
+    n = 4000
+    points = [(i + 0.5) * 0.1397 / n for i in range(n)]
+    flow = sum(eng.rising_velocity(changed, x) for x in points) * 0.1397 / n
+    assert flow == pytest.approx(2 * 0.035 * 4e-3, rel=1e-5)
+
+
+def test_numbers_of_the_base_case(case: Case) -> None:
+    report = check_case(case)
+    motion, bed, tma = report["motion"], report["bed"], report["inlets"]["tma"]
+    assert motion["amplitude_x"] == pytest.approx(0.168e-3, abs=5e-7)
+    assert motion["amplitude_y"] == pytest.approx(0.291e-3, abs=5e-7)
+    assert motion["peak_velocity_y"] == pytest.approx(0.0293, abs=5e-5)
+    assert motion["perfect_flight"] == pytest.approx(0.0169, abs=5e-5)
+    assert motion["straight_drop"] == pytest.approx(2 * 16 * motion["amplitude_x"], rel=1e-12)
+    assert tma["front_thickness"] == pytest.approx(13e-6, rel=0.02)
+    assert tma["gas_lifetime"] == pytest.approx(8.5e-6, rel=0.05)
+    assert tma["site_lifetime"] == pytest.approx(37e-6, rel=0.05)
+    assert tma["excess_number"] == pytest.approx(1.791, abs=1e-3)
+    assert bed["residence_time"] == pytest.approx(10.7, abs=0.05)
+    assert 0.5 < bed["gas_over_minimum_fluidisation"] < 0.7
+    assert report["mesh"]["cells"] == 28359 and report["run"]["steps"] == 2000
+    assert report["warnings"] == []
+
+
+def test_expected_steps(case: Case) -> None:
+    resolved = case.with_({"fidelity": "resolved"})
+    assert eng.expected_steps(resolved) == math.ceil(0.05 * 512) + math.ceil(19.95 * 512)
+    assert eng.expected_steps(case.with_({"fidelity": "steady"})) == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"motion.bed_velocity": "3 cm/s"}, "above perfect flight"),
+        ({"geometry.inlet.tma.velocity": "10 cm/s"}, "minimum fluidisation"),
+        ({"geometry.inlet.tma.mass_fractions.TMA": 0.021}, "not dilute"),
+        ({"time.steps_per_cycle": 4}, "CFL above 1"),
+        ({"time.step": "0.1 s"}, "columns in a step"),
+    ],
+)
+def test_what_is_questionable_is_said(case: Case, change: dict[str, object], text: str) -> None:
+    (warning,) = check_case(case.with_(change))["warnings"]
+    assert text in warning
+
+
+def test_numbers_that_do_not_exist_are_absent() -> None:
+    """No bed, no flow, no vibration: nothing is zero or NaN for want of a value."""
+    layer = [{"name": "gas", "height": "1 mm", "cells": 2}]
+    case = load_case({"geometry": {"length": "10 mm", "layer": layer}, "motion": {"gamma": 0}})
+    report = check_case(case)
+    assert "bed" not in report and report["inlets"] == {} and report["warnings"] == []
+    json.dumps(report, allow_nan=False)
+
+
+def test_check_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(EXAMPLE), "--json", "--set", "motion.gamma=0.4"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["motion"]["gamma"] == 0.4
+    assert load_case(report["case"]).motion.gamma == 0.4
+
+
+def test_check_prints_tables_and_warnings(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    assert main(["check", str(EXAMPLE), "--set", "motion.bed_velocity='3 cm/s'"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    for part in ("28,359 cells", "glass_beads", "TMA 0.0002", "excess", "perfect flight", "OH + TMA -> CH4"):
+        assert part in text
+    assert "warning: the bed is conveyed at 3 cm/s" in text
+
+
+def test_schema_and_versions(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["properties"]["geometry"]
+    assert main(["--version"]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in ("mpm", "python", "numpy", "dolfinx"))

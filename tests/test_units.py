@@ -1,0 +1,92 @@
+"""Conversion at the door: exact, checked for dimension and range, and reversible."""
+
+import math
+
+import pytest
+from pydantic_core import PydanticCustomError
+
+from mpm.units import Dimension, parse
+
+SPEED = Dimension("m/s", "a speed", "3.5 cm/s", at_least=0.0)
+DEADLINE = Dimension("s", "a time", "5 s", above=0.0, infinite=True)
+FRACTION = Dimension("", "a fraction", "0.46", above=0.0, below=1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("139.7 mm", "m", 0.1397),  # binary arithmetic would give the neighbouring float
+        ("3.5 cm/s", "m/s", 0.035),
+        ("-0.40 cm/s", "m/s", -0.004),
+        ("16Hz", "Hz", 16.0),
+        ("1e3m", "m", 1000.0),
+        (" 4.25 um^2 ", "m^2", 4.25e-12),
+        ("4.25 µm²", "m^2", 4.25e-12),
+        ("58000 1/m", "1/m", 58000.0),
+        ("1.72e-5 Pa s", "Pa*s", 1.72e-5),
+        ("200 degC", "K", 473.15),
+        ("1 atm", "Pa", 101325.0),
+        ("1.0 m^3/kmol/s", "m^3/mol/s", 1e-3),
+        ("6.92e-11 kmol/m^2", "mol/m^2", 6.92e-8),
+        ("871 J/(kg K)", "J/kg/K", 871.0),
+        ("60 deg", "rad", math.radians(60.0)),
+        ("0.5 turn", "rad", math.pi),
+    ],
+)
+def test_conversion_is_exact(text: str, unit: str, value: float) -> None:
+    assert parse(text, unit) == pytest.approx(value, rel=1e-15 if unit == "rad" else 0.0, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "reason"),
+    [
+        ("5", "m", "no unit"),
+        ("five mm", "m", "no number"),
+        ("", "m", "no number"),
+        ("5 s", "m", "time"),
+        ("5 mmm", "m", "unknown unit"),
+        ("5 m +", "m", "unknown unit"),
+        ("2*3 m", "m", "unknown unit"),  # an expression is not evaluated
+        ("960 rpm", "Hz", "angular"),  # pint would make it 100.5 Hz
+        ("100 rad/s", "Hz", "angular"),
+        ("1 Hz", "rad", "dimension"),
+    ],
+)
+def test_what_is_no_quantity_is_refused(text: str, unit: str, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        parse(text, unit)
+
+
+@pytest.mark.parametrize("unit", ["m", "m/s", "Pa*s", "m^3/mol/s", "rad", "K", "mol/m^2", "kg/mol", "J/kg/K"])
+@pytest.mark.parametrize("number", [0.1, 1.0 / 3.0, math.pi / 3.0, 6.92e-8, 1e300, 5e-324])
+def test_what_is_written_reads_back_as_the_same_float(unit: str, number: float) -> None:
+    dimension = Dimension(unit, "a quantity", "")
+    assert dimension.read(dimension.write(number)) == number
+
+
+@pytest.mark.parametrize(
+    "value", ["-1 mm/s", "nan m/s", "inf m/s", 3.5, True, None, ["1 m/s"], {"value": 1}, "1 m"]
+)
+def test_range_and_type_are_checked(value: object) -> None:
+    with pytest.raises(
+        PydanticCustomError, match=r'accepted: a speed from 0 m/s with its unit, e\.g\. "3\.5 cm/s"'
+    ):
+        SPEED.read(value)
+
+
+def test_infinity_is_accepted_only_where_it_means_something() -> None:
+    assert DEADLINE.read("inf s") == math.inf
+    assert DEADLINE.read(DEADLINE.write(math.inf)) == math.inf
+    with pytest.raises(PydanticCustomError):
+        DEADLINE.read("-inf s")
+
+
+@pytest.mark.parametrize(
+    ("value", "good"), [(0.46, True), (1, False), (0.0, False), ("0.46", False), (False, False)]
+)
+def test_pure_numbers_are_bare(value: object, good: bool) -> None:
+    if good:
+        assert FRACTION.read(value) == value
+    else:
+        with pytest.raises(PydanticCustomError):
+            FRACTION.read(value)
