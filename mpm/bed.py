@@ -95,6 +95,13 @@ class Bed:
         del leaving[:-MEMORY]
         return shifted
 
+    def memento(self) -> tuple:
+        """The present state, to go back to with `recall`. Coverages are replaced, never changed in place, so this is cheap."""
+        return self.theta, self.distance, self.shifted, list(self.left), list(self.right), self.passed.copy()
+
+    def recall(self, memento: tuple) -> None:
+        self.theta, self.distance, self.shifted, self.left, self.right, self.passed = memento
+
     def content(self) -> Floats:
         """Sites of each kind on this rank's solids [mol per metre of depth]."""
         return self.theta @ self.capacity

@@ -124,19 +124,22 @@ class SurfaceKinetics:
         return np.eye(k)[self.site].reshape(-1, k)
 
     def _two_sites(self, rates: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
-        """Closed form for two kinds of sites: theta' (2, n) and d theta'/d q_r (reactions, 2, n)."""
+        """Closed form for two kinds of sites: theta' (2, n) and d theta'/d q_r (reactions, 2, n).
+
+        theta_0' = (theta_0 + c) / (1 + a + c) and its complement, with a and c the turnover of either kind; as written, each stays in
+        [0, 1] in floating point too, because rounding is monotone.
+        """
         gain = np.zeros_like(theta)  # dt q of what turns the other kind into kind k
         share = np.zeros((len(self.reactions), 2))
         for r, s in enumerate(self.site):
             other = 1 - s
             share[r, other] = dt * self.nu_site[r, other]
             gain[other] += share[r, other] * rates[r]
-        whole = theta[0] + theta[1]
-        scale = 1.0 / (1.0 + gain[0] + gain[1])
-        new = (theta + gain * whole) * scale
+        whole = np.stack([(1.0 + gain[1]) + gain[0], (1.0 + gain[0]) + gain[1]])
+        new = (theta + gain) / whole
         response = np.empty((len(self.reactions), *theta.shape))
         for r, s in enumerate(self.site):
-            change = share[r, 1 - s] * new[s] * scale
+            change = share[r, 1 - s] * new[s] / whole[0]
             response[r, 1 - s], response[r, s] = change, -change
         return new, response
 

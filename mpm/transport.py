@@ -9,6 +9,7 @@ species alone. Species that are only made follow afterwards, one linear system e
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -187,16 +188,20 @@ class Transport:
 
         A step whose Newton iteration fails is halved, up to HALVINGS times. Raises ConvergenceError after that.
         """
-        before = self.concentration.copy()
+        concentration, theta = self.concentration, self.bed.theta  # replaced, never changed in place
         try:
             self._advance(number, t0, t1)
         except ConvergenceError as error:
-            self.concentration = before
             if halvings == HALVINGS:
                 raise ConvergenceError(f"t = {t0:.6g} s, step of {t1 - t0:.3g} s: {error}") from error
+            ledger = copy.deepcopy(self.ledger)
             middle = 0.5 * (t0 + t1)
-            self.advance(number, t0, middle, halvings + 1)
-            self.advance(number, middle, t1, halvings + 1)
+            try:
+                self.advance(number, t0, middle, halvings + 1)
+                self.advance(number, middle, t1, halvings + 1)
+            except ConvergenceError:
+                self.concentration, self.bed.theta, self.ledger = concentration, theta, ledger
+                raise
 
     def _advance(self, number: int, t0: float, t1: float) -> None:
         dt = t1 - t0

@@ -1,0 +1,132 @@
+"""Restart states: everything a run needs to go on, independent of the number of ranks.
+
+Arrays are stored in the grid's order. The velocity fields are stored too: a resumed run must not depend on how the flow solver rounds.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.diagnostics import Totals
+from mpm.errors import InputError
+from mpm.output import RunDirectory
+from mpm.parallel import is_root, on_root, total
+from mpm.replay import March, Replay, unpack
+
+if TYPE_CHECKING:
+    from mpm.case import Case
+    from mpm.reactor import Reactor
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def write(reactor: Reactor, directory: RunDirectory) -> None:
+    """Write the state of `reactor`; collective."""
+    arrays, meta = pack(reactor)
+    on_root(reactor.comm, lambda: directory.write_checkpoint(arrays, meta))
+
+
+def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays (on rank 0) and plain numbers of the state."""
+    transport, bed, flows = reactor.transport, reactor.bed, reactor.flows
+    assert flows is not None
+    ledger, scatter = transport.ledger, reactor.strip.scatter
+    gathered = {
+        "concentration": scatter.to_root(transport.concentration),
+        "gas_events": scatter.to_root(ledger.gas_events),
+        "flow": scatter.to_root(flows.stored()),
+        "theta": bed.scatter.to_root(bed.theta),
+        "surface_events": bed.scatter.to_root(ledger.surface_events),
+    }
+    arrays = {
+        **{name: values for name, values in gathered.items() if values is not None},
+        **{f"ledger_{name}": total(reactor.comm, getattr(ledger, name)) for name in SUMMED},
+        "passed": bed.passed,
+        "left": np.asarray(bed.left),
+        "right": np.asarray(bed.right),
+        "sites_initially": reactor.sites_initially,
+    }
+    if reactor.before is not None:
+        arrays["before_out"], arrays["before_volume"] = reactor.before.out, reactor.before.out_volume
+    meta = {
+        "time": reactor.time,
+        "steps": reactor.steps,
+        "wall": reactor.wall_before,
+        "distance": bed.distance,
+        "shifted": bed.shifted,
+        "species": list(transport.names),
+        "marched": flows.done if isinstance(flows, March) else -1,
+    }
+    return arrays, meta
+
+
+SUMMED = ("fed", "out", "back", "out_volume", "back_volume")
+
+
+def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
+    """Put `reactor`, freshly built for the same case, into the stored state; collective."""
+    transport, bed, strip = reactor.transport, reactor.bed, reactor.strip
+    if tuple(meta["species"]) != transport.names:
+        raise InputError(f"the restart state follows {', '.join(meta['species'])}; the case {', '.join(transport.names)}")
+    ledger = transport.ledger
+    transport.concentration = strip.scatter.to_local(arrays["concentration"])
+    ledger.gas_events = strip.scatter.to_local(arrays["gas_events"])
+    ledger.surface_events = bed.scatter.to_local(arrays["surface_events"])
+    bed.theta = bed.scatter.to_local(arrays["theta"])
+    for name in SUMMED:  # sums over ranks: rank 0 carries them on
+        values = arrays[f"ledger_{name}"]
+        setattr(ledger, name, values if is_root(reactor.comm) else np.zeros_like(values))
+    bed.passed = arrays["passed"]
+    bed.left, bed.right = list(arrays["left"]), list(arrays["right"])
+    bed.distance, bed.shifted = meta["distance"], meta["shifted"]
+    reactor.sites_initially = arrays["sites_initially"]
+    reactor.time, reactor.steps, reactor.wall_before = meta["time"], meta["steps"], meta["wall"]
+    fields = unpack(strip, arrays["flow"])
+    if meta["marched"] >= 0:
+        march = March(reactor.case, strip, reactor.motion, reactor.schedule)
+        march.restore(fields, meta["marched"])
+        reactor.flows = march
+    else:
+        reactor.flows = Replay(strip, fields, reactor.schedule.resting_steps > 0)
+    reactor.flows.register(transport)
+    if "before_out" in arrays:
+        now = reactor.totals()
+        reactor.before = Totals(
+            **{**vars(now), "out": arrays["before_out"], "out_volume": arrays["before_volume"]}
+        )
+
+
+def check_same_case(directory: RunDirectory, case: Case) -> None:
+    """Raise InputError unless the directory's case differs from `case` in nothing but an earlier end."""
+    path = directory.path / "case.toml"
+    if not path.exists():
+        return
+    old, new = tomllib.loads(path.read_text(encoding="utf-8")), tomllib.loads(case.to_toml())
+    changed = [key for key in _differences(old, new) if key != "time.end"]
+    if changed:
+        raise InputError(
+            f"{directory.path}: the case has changed in {changed[0]} since this run began; accepted with --resume: a later time.end"
+        )
+    state = directory.read_checkpoint()
+    if state is not None and case.time.end < state[1]["time"] * (1.0 - 1e-9):
+        raise InputError(
+            f"{directory.path}: time.end: found {case.time.end:g} s; accepted: not before the restart state at {state[1]['time']:g} s"
+        )
+
+
+def _differences(old: Any, new: Any, key: str = "") -> list[str]:
+    """Dotted keys in which two tables differ."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = [*old, *(k for k in new if k not in old)]
+        return [d for k in keys for d in _differences(old.get(k), new.get(k), f"{key}.{k}".lstrip("."))]
+    return [] if old == new else [key]
+
+
+def rows(columns: dict[str, NDArray[np.float64]]) -> list[dict[str, float]]:
+    """Columns of a history (NaN where a row lacks one) as rows."""
+    count = len(columns.get("time", ()))
+    return [{k: float(v[i]) for k, v in columns.items() if not np.isnan(v[i])} for i in range(count)]

@@ -1,0 +1,321 @@
+"""What a run reports: balances, titration, utilisation, outlet gas, parasitic growth, fronts.
+
+Every quantity is defined in the docstring of the function that computes it and named as in `summary.json`. Amounts are per metre of depth.
+A number that cannot be computed is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.constants import GAS_CONSTANT
+from mpm.geometry import Grid
+
+if TYPE_CHECKING:
+    from mpm.case import Case, Inlet, Zone
+
+Floats = NDArray[np.float64]
+FLOOR = 1e-6  # of the run's largest feed: balances of smaller amounts are measured against this
+
+
+@dataclass(frozen=True, eq=False)
+class Totals:
+    """Sums over all ranks since the start of a run [mol/m, m2], by species of the run (`names`).
+
+    `fed` (inlets, species), `out`, `back` (outlets, species), `out_volume` (outlets,), `stored`, `stored_initially` (species,) in the
+    gas; `surface` (reactions, reactive rows, columns) and `gas` (reactions, zones + 1) events, the last by zone number (0: none);
+    `sites`, `sites_initially` (site species,) on the solids in the strip, `sites_passed` those that left minus those that entered.
+    """
+
+    names: tuple[str, ...]
+    fed: Floats
+    out: Floats
+    back: Floats
+    out_volume: Floats
+    stored: Floats
+    stored_initially: Floats
+    surface: Floats
+    gas: Floats
+    sites: Floats
+    sites_initially: Floats
+    sites_passed: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Numbers of one instant: `theta` (sites, reactive rows, columns) and the CVD rate per zone and at its largest.
+
+    `cvd` is the integral of the rate over each zone's strip (zones + 1,) [mol/m/s], `cvd_max` the largest rate per total volume.
+    """
+
+    theta: Floats
+    reactive_rows: NDArray[np.int64]
+    cvd: Floats
+    cvd_max: float
+
+
+def species_balances(case: Case, totals: Totals) -> dict[str, dict[str, float]]:
+    """Per species: fed + produced = left + reacted + stored [mol/m].
+
+    `left` is what went out minus what an outlet drew back in, `stored` final minus initial, in the gas. `balance_error` is the residual
+    over the largest of these terms, or over 1e-6 of the run's largest feed when all are smaller. A species that nothing can bring about
+    has zeros.
+    """
+    mechanism = case.mechanism
+    events = {"surface": totals.surface.sum(axis=(1, 2)), "gas": totals.gas.sum(axis=1)}
+    largest = float(totals.fed.sum(axis=0).max(initial=0.0))
+    result = {}
+    for name in mechanism.species_names:
+        if name not in totals.names:
+            result[name] = dict.fromkeys(("fed", "left", "reacted", "stored", "produced", "balance_error"), 0.0)
+            continue
+        i = totals.names.index(name)
+        made = used = 0.0
+        for number, nu in _stoichiometry(case, totals.names, name):
+            kind, index = number
+            amount = nu * events[kind][index]
+            made, used = made + max(amount, 0.0), used - min(amount, 0.0)
+        fed = float(totals.fed[:, i].sum())
+        left = float((totals.out[:, i] - totals.back[:, i]).sum())
+        stored = float(totals.stored[i] - totals.stored_initially[i])
+        residual = fed + made - left - used - stored
+        scale = max(abs(fed), abs(left), used, abs(stored), made, FLOOR * largest)
+        result[name] = {
+            "fed": fed,
+            "left": left,
+            "reacted": used,
+            "stored": stored,
+            "produced": made,
+            "balance_error": abs(residual) / scale if scale else 0.0,
+        }
+    return result
+
+
+def _stoichiometry(case: Case, names: tuple[str, ...], species: str) -> list[tuple[tuple[str, int], float]]:
+    """((kind, running reaction), signed molecules per event) of `species`."""
+    terms: list[tuple[tuple[str, int], float]] = []
+    for index, surface in enumerate(running_surface(case, names)):
+        terms.append((("surface", index), surface.nu_gas.get(species, 0.0)))
+    for index, gas in enumerate(running_gas(case, names)):
+        terms.append((("gas", index), gas.nu.get(species, 0.0)))
+    return terms
+
+
+def running_surface(case: Case, names: tuple[str, ...]) -> list:
+    """Surface reactions whose gas is among the species of the run, in the mechanism's order."""
+    return [r for r in case.mechanism.surface_reactions if r.gas in names]
+
+
+def running_gas(case: Case, names: tuple[str, ...]) -> list:
+    """Gas reactions whose reactants all are."""
+    return [r for r in case.mechanism.gas_reactions if set(r.reactants) <= set(names)]
+
+
+def site_balance(case: Case, totals: Totals) -> float:
+    """Largest error over the site species of: initial + made by reactions - left the strip = final, relative to all sites involved."""
+    names = case.mechanism.site_names
+    residual = totals.sites - totals.sites_initially + totals.sites_passed
+    turned = 0.0
+    for index, reaction in enumerate(running_surface(case, totals.names)):
+        events = float(totals.surface[index].sum())
+        residual = residual - events * np.array([reaction.nu_site.get(k, 0.0) for k in names])
+        turned += events
+    scale = max(float(totals.sites_initially.sum()), turned)
+    return float(np.abs(residual).max(initial=0.0) / scale) if scale else 0.0
+
+
+def element_balances(case: Case, totals: Totals) -> dict[str, float]:
+    """Per element: what came in with gas and solids = what left with them + what is stored in the gas, on surfaces and in the film.
+
+    The carrier takes no part. Relative to the atoms fed (or, when none are, to those on the solids).
+    """
+    mechanism = case.mechanism
+    errors = {}
+    elements = sorted({e for part in (mechanism.species, mechanism.sites, mechanism.films) for p in part for e in p.elements})
+    for element in elements:
+        terms = []
+        for i, name in enumerate(totals.names):
+            atoms = mechanism.get(name).elements.get(element, 0.0)
+            terms += [
+                atoms * float(totals.fed[:, i].sum()),
+                -atoms * float((totals.out[:, i] - totals.back[:, i]).sum()),
+                -atoms * float(totals.stored[i] - totals.stored_initially[i]),
+            ]
+        for k, site in enumerate(mechanism.sites):
+            atoms = site.elements.get(element, 0.0)
+            terms += [
+                -atoms * float(totals.sites_passed[k]),
+                -atoms * float(totals.sites[k] - totals.sites_initially[k]),
+            ]
+        atoms_of_film = {film.name: film.elements.get(element, 0.0) for film in mechanism.films}
+        terms += [-atoms_of_film[name] * amount for name, amount in film_made(case, totals).items()]
+        scale = max((abs(t) for t in terms), default=0.0)
+        errors[element] = abs(sum(terms)) / scale if scale else 0.0
+    return errors
+
+
+def film_made(case: Case, totals: Totals) -> dict[str, float]:
+    """Formula units of each solid product on the particles and the frit [mol/m]."""
+    made = {film.name: 0.0 for film in case.mechanism.films}
+    for index, reaction in enumerate(running_surface(case, totals.names)):
+        for name, count in reaction.film.items():
+            made[name] += count * float(totals.surface[index].sum())
+    return made
+
+
+def dosed_species(case: Case, inlet: Inlet) -> str | None:
+    """The species an inlet doses that has a half-reaction, or None."""
+    return next((n for n, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reaction(n)), None)
+
+
+def zone_of(case: Case, inlet: Inlet) -> Zone | None:
+    return next((zone for zone in case.geometry.zones if zone.inlet == inlet.name), None)
+
+
+def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
+    """Per dosing inlet: coverage of the site species that its half-reaction makes.
+
+    `box_mean`: mean over the moving layer from the left end of the inlet's zone to the inlet's centreline; `exit_profile`: the zone's
+    last column, bottom to top; `exit_mean`, `exit_min` of it. Without a moving layer the topmost reactive one counts.
+    """
+    layer = conveyed_layer(case)
+    if layer is None:
+        return {}
+    rows = grid.layer_rows(layer)
+    inside = (state.reactive_rows >= rows.start) & (state.reactive_rows < rows.stop)
+    heights = grid.dy[state.reactive_rows[inside]]
+    result: dict[str, dict[str, Any]] = {}
+    for inlet in case.geometry.inlets:
+        species, zone = dosed_species(case, inlet), zone_of(case, inlet)
+        if species is None or zone is None:
+            continue
+        site = case.mechanism.half_reaction(species).product_site
+        theta = state.theta[case.mechanism.site_names.index(site)][inside]
+        box = grid.columns_between(zone.start, inlet.center)
+        last = np.flatnonzero(grid.columns_between(zone.start, zone.end))[-1]
+        profile = theta[:, last]
+        entry = {
+            "exit_mean": float(profile @ heights / heights.sum()),
+            "exit_min": float(profile.min()),
+            "exit_profile": [float(v) for v in profile],
+        }
+        if box.any():
+            entry["box_mean"] = float((theta[:, box].mean(axis=1) @ heights) / heights.sum())
+        result[inlet.name] = entry
+    return result
+
+
+def conveyed_layer(case: Case) -> str | None:
+    """Name of the moving layer, else of the topmost one with reactive surface."""
+    reactive = [l for l in case.geometry.layers if l.material and l.material.surface_to_volume > 0.0]
+    moving = [l for l in reactive if l.moving]
+    chosen = moving or reactive
+    return chosen[-1].name if chosen else None
+
+
+def utilisation(case: Case, grid: Grid, totals: Totals) -> dict[str, float]:
+    """Per dosing inlet: precursor reacted on surfaces in its zone over what it has fed."""
+    result = {}
+    for inlet in case.geometry.inlets:
+        species, zone = dosed_species(case, inlet), zone_of(case, inlet)
+        if species is None or zone is None:
+            continue
+        k = case.geometry.inlets.index(inlet)
+        fed = float(totals.fed[k, totals.names.index(species)])
+        columns = grid.columns_between(zone.start, zone.end)
+        used = 0.0
+        for index, reaction in enumerate(running_surface(case, totals.names)):
+            used -= reaction.nu_gas.get(species, 0.0) * float(totals.surface[index][:, columns].sum())
+        if fed > 0.0:
+            result[inlet.name] = used / fed
+    return result
+
+
+def outlet_fractions(case: Case, totals: Totals, before: Totals | None) -> dict[str, dict[str, dict[str, float]]]:
+    """Flux-weighted mole fractions of what left each outlet since `before` (the previous output; None: since the start).
+
+    Amount of the species over amount of gas (volume times p/(R T)); the carrier by difference. Gas drawn back in does not count.
+    """
+    molar_density = total_concentration(case)
+    result = {}
+    for k, outlet in enumerate(case.geometry.outlets):
+        volume = totals.out_volume[k] - (before.out_volume[k] if before else 0.0)
+        if volume <= 0.0:
+            continue
+        amounts = totals.out[k] - (before.out[k] if before else 0.0)
+        fractions = {name: 0.0 for name in case.mechanism.species_names}
+        for name, amount in zip(totals.names, amounts, strict=True):
+            fractions[name] = float(amount / (volume * molar_density))
+        fractions[case.gas.carrier] = 1.0 - sum(fractions.values())
+        result[outlet.name] = {"x": fractions}
+    return result
+
+
+def total_concentration(case: Case) -> float:
+    """p/(R T) [mol/m3]."""
+    return case.gas.pressure / (GAS_CONSTANT * case.gas.temperature)
+
+
+def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:
+    """Parasitic gas reactions now: `rate_mean` over the strip, `rate_max` [mol/m3/s per total volume], `share_in_zone` of the integral."""
+    if not case.mechanism.gas_reactions:
+        return {}
+    whole = float(state.cvd.sum())
+    area = grid.length * float(grid.y[-1] - grid.y[0])
+    result: dict[str, Any] = {"rate_mean": whole / area, "rate_max": state.cvd_max}
+    if whole > 0.0:
+        result["share_in_zone"] = {
+            zone.name: float(state.cvd[number] / whole) for number, zone in enumerate(case.geometry.zones, start=1)
+        }
+    return result
+
+
+def history_row(
+    case: Case, grid: Grid, time: float, totals: Totals, state: State, before: Totals | None
+) -> dict[str, float]:
+    """One row of history.csv, flat dotted names."""
+    balances = species_balances(case, totals)
+    tree: dict[str, Any] = {
+        "time": time,
+        "titration": {
+            name: {k: v for k, v in entry.items() if k != "exit_profile"} for name, entry in titration(case, grid, state).items()
+        },
+        "utilisation": utilisation(case, grid, totals),
+        "outlets": outlet_fractions(case, totals, before),
+        "cvd": cvd(case, grid, state),
+        "balance": {
+            **{name: entry["balance_error"] for name, entry in balances.items()},
+            "sites": site_balance(case, totals),
+        },
+    }
+    return flatten(tree)
+
+
+def flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+    """Nested tables as one table with dotted names."""
+    flat: dict[str, float] = {}
+    for key, value in tree.items():
+        name = f"{prefix}{key}"
+        if isinstance(value, Mapping):
+            flat.update(flatten(value, f"{name}."))
+        else:
+            flat[name] = value
+    return flat
+
+
+def nested(flat: Mapping[str, float], name: str) -> dict[str, Any]:
+    """The table `name` of a flat history row, as nested tables."""
+    tree: dict[str, Any] = {}
+    for key, value in flat.items():
+        parts = key.split(".")
+        if parts[0] == name:
+            branch = tree
+            for part in parts[1:-1]:
+                branch = branch.setdefault(part, {})
+            branch[parts[-1]] = value
+    return tree

@@ -1,0 +1,79 @@
+"""The live line of a run: simulated time, steps per second, time left, worst balance. Only rank 0 prints."""
+
+from __future__ import annotations
+
+import time as clock
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from rich.console import Console
+
+from mpm.parallel import is_root
+
+if TYPE_CHECKING:
+    from mpm.reactor import Reactor
+
+
+class Progress:
+    """Shows how `reactor` gets on: a line that renews itself on a terminal, a line every ten seconds elsewhere."""
+
+    def __init__(self, reactor: Reactor, shown: bool):
+        self.reactor = reactor
+        self.shown = shown and is_root(reactor.comm)
+        self.console = Console(stderr=True)
+        self.interval = 0.2 if self.console.is_terminal else 10.0
+        self.status = None
+        self.begun, self.first, self.printed = clock.monotonic(), None, clock.monotonic()
+
+    def __enter__(self) -> Self:
+        if self.shown and self.console.is_terminal:
+            self.status = self.console.status("starting")
+            self.status.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self.shown:
+            self._print(force=True)
+        if self.status is not None:
+            self.status.stop()
+
+    def say(self, text: str) -> None:
+        """What is being done before the first step."""
+        if not self.shown:
+            return
+        if self.status is not None:
+            self.status.update(text)
+        elif clock.monotonic() - self.printed > self.interval or text == "flow":
+            self.printed = clock.monotonic()
+            self.console.print(text, highlight=False)
+
+    def advance(self) -> None:
+        """A step has been done."""
+        if self.first is None:
+            self.first = (clock.monotonic(), self.reactor.steps)
+        if self.shown and clock.monotonic() - self.printed > self.interval:
+            self._print()
+
+    def _print(self, force: bool = False) -> None:
+        self.printed = clock.monotonic()
+        text = self.line()
+        if self.status is not None:
+            self.status.update(text)
+        if text and (self.status is None or force):
+            self.console.print(text, highlight=False)
+
+    def line(self) -> str:
+        """One line of numbers; empty before the first step."""
+        if self.first is None:
+            return ""
+        reactor = self.reactor
+        done = reactor.steps - self.first[1]
+        elapsed = clock.monotonic() - self.first[0]
+        speed = done / elapsed if elapsed > 0.0 else 0.0
+        balances = [value for name, value in reactor.numbers.items() if name.startswith("balance.")]
+        left = (reactor.schedule.steps - reactor.steps) / speed if speed else float("nan")
+        remaining = f"{left:.0f} s left" if speed and left > 0.0 else "done" if left == 0.0 else ""
+        return (
+            f"t = {reactor.time:.3f} of {reactor.case.time.end:g} s  step {reactor.steps}  {speed:.1f} steps/s  {remaining}  "
+            f"worst balance {max(balances, default=0.0):.1e}"
+        )

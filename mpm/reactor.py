@@ -1,0 +1,348 @@
+"""The reactor: puts mesh, motion, flow, bed and transport together and marches them in time.
+
+    result = Reactor(load_case("single_zone")).run("results/zone")
+    result.summary["titration"]["tma"]["exit_mean"]
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm import checkpoint, fem  # noqa: F401  (fem first: it loads the finite-element stack)
+from mpm.bed import Bed
+from mpm.diagnostics import State, Totals, history_row, total_concentration
+from mpm.errors import ConvergenceError, InputError, Interrupted
+from mpm.geometry import Grid
+from mpm.motion import BedMotion, step_motion
+from mpm.output import RunDirectory
+from mpm.parallel import is_root, largest, on_root, total
+from mpm.progress import Progress
+from mpm.replay import March, Replay
+from mpm.schedule import Schedule, Step
+from mpm.strip import Strip
+from mpm.summary import summarise
+from mpm.transport import Transport
+
+from mpi4py import MPI  # isort: skip  (after fem)
+
+if TYPE_CHECKING:
+    from mpm.case import Case
+
+Floats = NDArray[np.float64]
+log = logging.getLogger("mpm")
+Callback = Callable[["Reactor"], None]
+
+
+class Result:
+    """What a run gives: `summary` (as summary.json), `history` (columns of history.csv), and fields of the last instant."""
+
+    def __init__(self, reactor: Reactor, summary: dict[str, Any]):
+        self.summary = summary
+        self.history = reactor.history()
+        self.field = reactor.field
+        self.coverage = reactor.coverage
+        self.grid = reactor.grid
+
+
+class Reactor:
+    """One case on the ranks of `comm`.
+
+    `time` [s] and `steps` done so far; `numbers` is the latest row of the history. `field`, `coverage` and `totals` are collective: every
+    rank calls them and gets the whole.
+    """
+
+    def __init__(self, case: Case, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.case, self.comm = case, comm
+        self.grid = Grid.from_case(case)
+        self.schedule = Schedule.from_case(case)
+        self.strip = Strip(case, comm)
+        self.motion = BedMotion(case.motion)
+        self.bed = Bed(case, self.strip)
+        self.transport = Transport(case, self.strip, self.bed)
+        self.flows: Replay | March | None = None
+        self.time, self.steps, self.wall_before = 0.0, 0, 0.0
+        self.numbers: dict[str, float] = {}
+        self.rows: list[dict[str, float]] = []
+        self.sites_initially = total(comm, self.bed.content())
+        self.stored_initially = total(comm, self.transport.concentration @ self.transport.gas_volume)
+        self.before: Totals | None = None
+        self._stop = False
+
+    # --- running ---
+
+    def run(
+        self,
+        output: str | Path | None = None,
+        callback: Callback | None = None,
+        resume: bool = False,
+        overwrite: bool = False,
+        progress: bool = False,
+    ) -> Result:
+        """March to the end of the case, calling `callback(reactor)` at every output time.
+
+        With `output`, everything the run writes goes there; `resume` continues from its restart state. Raises InputError (directory,
+        changed case), ConvergenceError and Interrupted; after the last two the directory is usable and can be resumed.
+        """
+        begun = clock.monotonic()
+        directory = self._open(output, resume, overwrite)
+        with Progress(self, progress) as bar, self._signals():
+            try:
+                if not self._restored:
+                    self._start(bar)
+                    self._write(directory, callback, None)
+                self._march(directory, callback, bar)
+            except (ConvergenceError, Interrupted) as error:
+                self._give_up(directory, begun, error)
+                raise
+        summary = summarise(self, "done", self.wall_before + clock.monotonic() - begun)
+        self._save(directory, summary, begun)
+        return Result(self, summary)
+
+    def _open(self, output: str | Path | None, resume: bool, overwrite: bool) -> RunDirectory | None:
+        """Prepare the directory on rank 0 and read a restart state into every rank."""
+        self._restored = False
+        if output is None:
+            return None
+        directory = RunDirectory(output)
+
+        def prepare() -> Any:
+            directory.prepare(resume=resume, overwrite=overwrite)
+            state = directory.read_checkpoint() if resume else None
+            if resume:
+                checkpoint.check_same_case(directory, self.case)
+            directory.write_case(self.case.to_toml())
+            return state
+
+        state = on_root(self.comm, prepare)
+        if state is not None:
+            checkpoint.restore(self, *state)
+            self._restored = True
+            cut = self.time
+
+            def cut_back() -> dict[str, Floats]:
+                directory.cut_back(cut + 1e-9 * self.schedule.dt)
+                return directory.history()
+
+            self.rows = checkpoint.rows(on_root(self.comm, cut_back))
+            self.numbers = self.rows[-1] if self.rows else {}
+        elif resume:
+            on_root(self.comm, lambda: directory.cut_back(-1.0))
+        return directory if is_root(self.comm) else RunDirectory(output)
+
+    def _start(self, bar: Progress) -> None:
+        """Find the flow of a fresh run."""
+        bar.say("flow")
+        if self.case.fidelity == "resolved" and self.case.motion.startup == "impulsive":
+            self.flows = March(self.case, self.strip, self.motion, self.schedule)
+        else:
+
+            def watch(cycle: int, change: float) -> None:
+                bar.say(f"flow, cycle {cycle + 1}, change {change:.1e}")
+                self._check_stop()
+
+            self.flows = Replay.solve(self.case, self.strip, self.motion, self.schedule, watch)
+        self.flows.register(self.transport)
+
+    def _march(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress) -> None:
+        assert self.flows is not None
+        last_checkpoint = clock.monotonic()
+        for step in self.schedule.from_step(self.steps):
+            self._take(step)
+            if self.schedule.is_output(step, self.case.output.every):
+                self._write(directory, callback, step)
+            bar.advance()
+            due = clock.monotonic() - last_checkpoint > self.case.output.checkpoint
+            stop, due = largest(self.comm, [self._stop, due and is_root(self.comm)]) > 0.0
+            if due and directory is not None:
+                checkpoint.write(self, directory)
+                last_checkpoint = clock.monotonic()
+            if stop:
+                raise Interrupted(f"interrupted at t = {self.time:.6g} s, after step {self.steps}")
+
+    def _take(self, step: Step) -> None:
+        """One step: the bed slides, then gas and coverage follow over the new position."""
+        assert self.flows is not None
+        number = self.flows.number(step, self.transport)
+        memento = self.bed.memento()
+        slide = step_motion(self.motion, step.since, step.since + step.dt).slide if step.since >= 0.0 else 0.0
+        self.bed.advance(slide)
+        try:
+            self.transport.advance(number, step.t0, step.t1)
+        except ConvergenceError as error:
+            self.bed.recall(memento)
+            raise ConvergenceError(f"step {step.index + 1}: {error}") from error
+        self.time, self.steps = step.t1, step.index + 1
+
+    def _check_stop(self) -> None:
+        if largest(self.comm, [self._stop])[0] > 0.0:
+            raise Interrupted("interrupted while the flow was being found; nothing but the case has been written")
+
+    @contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Turn SIGINT and SIGTERM into a stop after the step in hand."""
+
+        def stop(number: int, frame: object) -> None:
+            self._stop = True
+
+        previous = {}
+        try:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                previous[number] = signal.signal(number, stop)
+        except ValueError:  # not the main thread: the caller handles signals
+            pass
+        try:
+            yield
+        finally:
+            for number, handler in previous.items():
+                signal.signal(number, handler)
+
+    # --- writing ---
+
+    def _write(self, directory: RunDirectory | None, callback: Callback | None, step: Step | None) -> None:
+        """Record an output time: a row of the history, the fields, the callback."""
+        totals = self.totals()
+        self.numbers = history_row(self.case, self.grid, self.time, totals, self.state(), self.before)
+        self.before = totals
+        self.rows.append(self.numbers)
+        if directory is not None:
+            fields = self.fields(step)
+
+            def write() -> None:
+                directory.append_history(self.numbers)
+                directory.write_fields(self.time, self.grid, fields)
+
+            on_root(self.comm, write)
+        if callback is not None:
+            callback(self)
+
+    def _save(self, directory: RunDirectory | None, summary: dict[str, Any], begun: float) -> None:
+        if directory is None:
+            return
+        wall = self.wall_before
+        self.wall_before += clock.monotonic() - begun
+        checkpoint.write(self, directory)
+        self.wall_before = wall
+        on_root(self.comm, lambda: directory.write_summary(summary))
+
+    def _give_up(self, directory: RunDirectory | None, begun: float, error: Exception) -> None:
+        """Keep the last good state and say in summary.json how the run ended."""
+        if directory is None or self.flows is None:
+            return
+        status = "interrupted" if isinstance(error, Interrupted) else "failed"
+        log.error("%s", error)
+        self._save(directory, summarise(self, status, self.wall_before + clock.monotonic() - begun), begun)
+
+    # --- looking ---
+
+    def history(self) -> dict[str, Floats]:
+        """Columns of the history; NaN where a row lacks one."""
+        names = dict.fromkeys(name for row in self.rows for name in row)
+        return {name: np.array([row.get(name, np.nan) for row in self.rows]) for name in names}
+
+    def totals(self) -> Totals:
+        """What has passed so far, summed over all ranks; collective."""
+        transport, bed, comm, grid = self.transport, self.bed, self.comm, self.grid
+        ledger = transport.ledger
+        fed, out, back, volume = (total(comm, v) for v in (ledger.fed, ledger.out, ledger.back, ledger.out_volume))
+        surface = bed.scatter.to_all(ledger.surface_events) if len(ledger.surface_events) else np.zeros((0, 0))
+        zones = grid.zone_of_column[self.strip.column[: self.strip.owned]]
+        count = len(self.case.geometry.zones) + 1
+        gas = np.array([np.bincount(zones, e, count) for e in ledger.gas_events]).reshape(-1, count)
+        return Totals(
+            names=transport.names,
+            fed=fed,
+            out=out,
+            back=back,
+            out_volume=volume,
+            stored=total(comm, transport.concentration @ transport.gas_volume),
+            stored_initially=self.stored_initially,
+            surface=surface.reshape(len(ledger.surface_events), len(bed.rows), grid.columns),
+            gas=total(comm, gas),
+            sites=total(comm, bed.content()),
+            sites_initially=self.sites_initially,
+            sites_passed=bed.passed.copy(),
+        )
+
+    def state(self) -> State:
+        """Coverage and gas reaction rates now; collective."""
+        rate = self._cvd_rate()
+        zones = self.grid.zone_of_column[self.strip.column[: self.strip.owned]]
+        per_zone = np.bincount(zones, rate * self.transport.volume, len(self.case.geometry.zones) + 1)
+        return State(
+            theta=self.bed.whole(),
+            reactive_rows=self.bed.rows,
+            cvd=total(self.comm, per_zone),
+            cvd_max=float(largest(self.comm, [rate.max(initial=0.0)])[0]),
+        )
+
+    def _cvd_rate(self) -> Floats:
+        """Events of gas reactions per total volume in own cells [mol/m3/s]."""
+        coupled = len(self.transport.roles.coupled)
+        rates, _ = self.transport.gas.rates(self.transport.concentration[:coupled])
+        return rates.sum(axis=0) * self.transport.porosity
+
+    def _local_fields(self, step: Step | None) -> dict[str, Floats]:
+        """Everything that can be shown, own cells: names as in the files."""
+        assert self.flows is not None
+        own = self.strip.owned
+        concentration = dict(zip(self.transport.names, self.transport.concentration, strict=True))
+        fields: dict[str, Floats] = {}
+        whole = total_concentration(self.case)
+        carrier = np.ones(own)
+        for name in self.case.mechanism.species_names:
+            c = concentration.get(name, np.zeros(own))
+            fields[f"C_{name}"], fields[f"x_{name}"] = c, c / whole
+            carrier -= c / whole
+        fields[f"x_{self.case.gas.carrier}"] = carrier
+        for k, site in enumerate(self.case.mechanism.site_names):
+            fields[f"theta_{site}"] = np.zeros(own)
+            fields[f"theta_{site}"][self.bed.cells] = self.bed.theta[k]
+        fields["cvd_rate"] = self._cvd_rate()
+        flow = self.flows.field(step if step is not None else self.schedule.step(max(self.steps - 1, 0)))
+        bottom, left, right, top = flow.velocities[:, :own]
+        fields["velocity_x"], fields["velocity_y"] = 0.5 * (left + right), 0.5 * (bottom + top)
+        fields["pressure"] = flow.pressure[:own]
+        return fields
+
+    def fields(self, step: Step | None = None) -> dict[str, Floats]:
+        """All cell fields for the files, in the grid's order, on rank 0 (empty elsewhere); collective."""
+        local = self._local_fields(step)
+        values = self.strip.scatter.to_root(np.stack(list(local.values())))
+        if values is None:
+            return {}
+        fields = dict(zip(local, values, strict=True))
+        x, y = fields.pop("velocity_x"), fields.pop("velocity_y")
+        return {**fields, "velocity": np.column_stack([x, y])}
+
+    def field(self, name: str) -> Floats:
+        """One cell field as (rows, columns) on every rank, or (rows, columns, 2) for `velocity`; collective.
+
+        Names are those of the files: C_TMA, x_CH4, theta_OH, cvd_rate, velocity, pressure. Raises InputError for another.
+        """
+        local = self._local_fields(None)
+        shape = (self.grid.rows, self.grid.columns)
+        if name == "velocity":
+            both = self.strip.scatter.to_all(np.stack([local["velocity_x"], local["velocity_y"]]))
+            return np.moveaxis(both.reshape(2, *shape), 0, -1)
+        if name not in local:
+            raise InputError(f"no field {name!r}; there are velocity, {', '.join(n for n in local if 'velocity' not in n)}")
+        return self.strip.scatter.to_all(local[name]).reshape(shape)
+
+    def coverage(self, layer: str, site: str) -> Floats:
+        """Coverage of `site` in `layer` as (rows, columns), bottom row first; collective. Raises InputError for unknown names."""
+        if layer not in self.grid.layer_names:
+            raise InputError(f"no layer {layer!r}; there are {', '.join(self.grid.layer_names)}")
+        if site not in self.case.mechanism.site_names:
+            raise InputError(f"no site {site!r}; there are {', '.join(self.case.mechanism.site_names)}")
+        rows = self.grid.layer_rows(layer)
+        chosen = (self.bed.rows >= rows.start) & (self.bed.rows < rows.stop)
+        return self.bed.whole()[self.case.mechanism.site_names.index(site)][chosen]
