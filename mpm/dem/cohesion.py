@@ -7,7 +7,9 @@ import numpy as np
 INNER_CUTOFF = 0.3e-9  # m, smallest distance between molecules; the force is held below it and in contact
 OUTER_CUTOFF = 10e-9  # m, no force beyond it
 TABLE_SPACING = 0.1e-9  # m; error of the interpolated force <= 0.5 % of its maximum
-TABLE_OVERLAP = 0.05  # part of the contact distance the table reaches into the overlap
+TABLE_OVERLAP = (
+    0.12  # part of the contact distance the table reaches into the overlap; landing beds reach 0.05 at 3 N/m
+)
 
 
 def rumpf_force(separation: np.ndarray, hamaker: float, radius: float, asperity: float) -> np.ndarray:

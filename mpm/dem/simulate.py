@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mpm.errors import InputError
+from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
 
 from .base import FLAT, Base, Filling, fit_length, frit_monolayer, loose_filling, sawtooth_baffle
@@ -95,7 +95,7 @@ class Simulation:
         if saved is not None:
             self.recorder.restore(saved)
             if done >= self.case.run.cycles:
-                return self._cut(self.recorder.arrays()) if self.rank == 0 else None
+                return self.load_arrays() if self.rank == 0 else None
             start = Particles(saved["position"], saved["speed"], saved["spin"], saved["classes"])
         else:
             start = Particles.at_rest(self.filling.positions, self.filling.classes)
@@ -150,12 +150,24 @@ class Simulation:
                 self._refresh_drag(box, self.gas, self.gas.flux(float(base[1, i : i + 2].mean())))
             box.run(self.steps)
             if (i + 1) % every == 0:
-                state = box.snapshot()
                 now = cycle + (i + 1) / run.updates_per_cycle
-                if state is not None:
-                    self.recorder.check(state, now)
-                    self.recorder.sample(float(times[i + 1]), state)
+                self._record(box, float(times[i + 1]), now)
                 progress(now)
+
+    def _record(self, box: Box, time: float, cycle: float) -> None:
+        """Check and sample on rank 0; an impossible state is raised by every rank."""
+        failure: ConvergenceError | None = None
+        state = box.snapshot()
+        if state is not None:
+            try:
+                self.recorder.check(state, cycle)
+                self.recorder.sample(time, state)
+            except ConvergenceError as error:
+                failure = error
+        if self.comm is not None:
+            failure = self.comm.bcast(failure, root=0)
+        if failure is not None:
+            raise failure
 
     def _refresh_drag(self, box: Box, gas: GasDrag, flux: float) -> None:
         height, velocity, diameter = box.local_bed()
@@ -202,6 +214,13 @@ class Simulation:
                 "may change on --resume"
             )
         return saved
+
+    def load_arrays(self) -> dict[str, np.ndarray]:
+        """The recorder's arrays of a finished seed, up to the case's number of cycles."""
+        saved = self._load()
+        if saved is None or int(saved["cycles"]) < self.case.run.cycles:
+            raise InputError(f"{self.directory}: this seed is not finished; go on with --resume")
+        return self._cut({name: saved[name] for name in (*self.recorder.data, "edges")})
 
     def _cut(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Leave out cycles beyond the number that is asked for."""

@@ -1,0 +1,187 @@
+"""`mpm dem POWDER.toml` and `mpm dem waveform DATA.csv`, a sub-command of `mpm` and also a program of its own."""
+
+import json
+import os
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mpm.errors import InputError
+
+from .accelerometer import fit_record, read_record, resample, spectrum
+from .case import load_case
+from .waveform import extension_velocity, peak_displacement
+
+
+class RunByDefault(TyperGroup):
+    """`mpm dem X ...` means `mpm dem run X ...` unless X is a command."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if args and args[0] not in self.commands and args[0] not in ("--help", "-h"):
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=RunByDefault,
+    name="dem",
+    help="Bed velocity from particle simulations: mpm dem POWDER.toml [-o DIR], mpm dem waveform DATA.csv.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+@app.command()
+def run(
+    powder: Annotated[Path, typer.Argument(metavar="POWDER.toml", help="a powder file, see docs/dem.md")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/POWDER")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option("-j", "--jobs", metavar="N", help="seeds at a time")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="override a key, e.g. box.stiffness='3 N/m'"),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="go on after the last whole cycle of each seed")
+    ] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an earlier run in DIR")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="no progress bar and no summary")] = False,
+) -> None:
+    """Simulate a vibrated powder bed; write profile.csv, summary.json, maps and pictures."""
+    if resume and overwrite:
+        raise InputError("mpm dem: --resume and --overwrite exclude each other")
+    case = load_case(powder, _overrides(settings or []))
+    case.build_waveform()  # a bad data file is bad input: say so before anything is written
+    if jobs is not None and jobs < 1:
+        raise InputError(f"mpm dem: --jobs: found {jobs}; accepted: a number from 1")
+    directory = output or Path("results") / powder.stem
+
+    from .box import load_lammps
+
+    load_lammps()
+    from mpi4py import MPI
+
+    from .run import interrupted, progress_bar, run_case
+
+    speaks = MPI.COMM_WORLD.rank == 0 and not quiet
+    report, close = progress_bar(case, speaks)
+    try:
+        summary = run_case(
+            case,
+            directory,
+            jobs=jobs or min(len(case.run.seeds), os.cpu_count() or 1),
+            resume=resume,
+            overwrite=overwrite,
+            report=report,
+        )
+    except KeyboardInterrupt:
+        raise interrupted(directory) from None
+    finally:
+        close()
+    if speaks:
+        typer.echo(_lines(summary, directory))
+
+
+def _lines(summary: dict[str, Any], directory: Path) -> str:
+    """The result in a few lines."""
+    speed, lift = summary["mean_velocity"], summary["liftoff"]
+    spread = f" ± {100 * speed['spread']:.2f}" if speed.get("spread") is not None else ""
+    seeds = ", ".join(f"{100 * v:.2f}" for v in speed["seeds"])
+    flight = "no flight"
+    if lift.get("phase_deg") is not None:
+        flight = f"flies from {lift['phase_deg']:.0f} to {lift['contact_phase_deg']:.0f} deg"
+    return "\n".join(
+        [
+            f"mean velocity   {100 * speed['mean']:.2f}{spread} cm/s (seeds: {seeds})",
+            f"efficiency      {summary['efficiency']:.2f}; straight drop {100 * summary['limits']['straight_drop']:.2f}, "
+            f"perfect flight {100 * summary['limits']['perfect_flight']:.2f} cm/s",
+            f"bed             {flight}; {summary['coordination']['contacts_per_particle']:.1f} contacts per particle",
+            f"written         {directory / 'profile.csv'} (for motion.profile), summary.json, plots/",
+        ]
+    )
+
+
+@app.command()
+def waveform(
+    data: Annotated[
+        Path, typer.Argument(metavar="DATA.csv", help="columns t [s], a_y, a_z (along, vertical)")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/DATA")
+    ] = None,
+    harmonics: Annotated[
+        int, typer.Option("-n", "--harmonics", min=1, max=16, help="harmonics per direction")
+    ] = 3,
+    unit: Annotated[str, typer.Option(help="of the accelerations: m/s^2 or g")] = "m/s^2",
+) -> None:
+    """Fit the largest harmonics of accelerometer data; write waveform.json, waveform.toml and a plot."""
+    record = read_record(data, unit)
+    fitted, along, vertical = fit_record(record, harmonics)
+    directory = output or Path("results") / data.stem
+    directory.mkdir(parents=True, exist_ok=True)
+
+    from mpm.files import write_atomically
+
+    from .report import draw_waveform, finite
+
+    rows = {"horizontal": (fitted.horizontal, along), "vertical": (fitted.vertical, vertical)}
+    report: dict[str, Any] = {
+        "frequency": fitted.frequency,
+        "peak_displacement": dict(zip(("horizontal", "vertical"), peak_displacement(fitted), strict=True)),
+        "extension_velocity": extension_velocity(fitted),
+    }
+    toml = [f'[waveform]\nkind = "harmonics"\nfrequency = "{fitted.frequency!r} Hz"']
+    for name, (terms, fit) in rows.items():
+        report[name] = {
+            "explained_variance": fit.explained,
+            "harmonics": [
+                {
+                    "amplitude": h.amplitude,
+                    "frequency": h.frequency,
+                    "phase": h.phase,
+                    "amplitude_correction": c,
+                }
+                for h, c in zip(terms, fit.correction, strict=True)
+            ],
+        }
+        toml += [
+            f"[[waveform.{name}]]\n"
+            f'amplitude = "{h.amplitude!r} m/s^2"\nfrequency = "{h.frequency!r} Hz"\nphase = "{h.phase!r} rad"'
+            for h in terms
+        ]
+    write_atomically(
+        directory / "waveform.json", json.dumps(finite(report), indent=2, allow_nan=False) + "\n"
+    )
+    write_atomically(directory / "waveform.toml", "\n".join(toml) + "\n")
+    spectra = [spectrum(*resample(record.t, row)) for row in record.acceleration]
+    draw_waveform(directory / "waveform.png", (record.t, record.acceleration), fitted, spectra)
+    typer.echo(f"fundamental {fitted.frequency:.3f} Hz")
+    for name, (terms, fit) in rows.items():
+        typer.echo(f"{name}: {100 * fit.explained:.1f} % of the variance")
+        for h, c in zip(terms, fit.correction, strict=True):
+            typer.echo(
+                f"  {h.amplitude:8.3f} m/s2 at {h.frequency:8.3f} Hz, phase {h.phase:+.3f} rad (FFT amplitude x {c:.3f})"
+            )
+    typer.echo(f"written {directory / 'waveform.toml'} (for a powder file), waveform.json, waveform.png")
+
+
+def _overrides(settings: list[str]) -> dict[str, Any]:
+    """KEY=VALUE arguments; a value is TOML if it can be read as such, else a string."""
+    out: dict[str, Any] = {}
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals or not key.strip():
+            raise InputError(
+                f"mpm dem: --set: found {setting!r}; accepted: KEY=VALUE, e.g. box.stiffness='3 N/m'"
+            )
+        try:
+            out[key.strip()] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            out[key.strip()] = text
+    return out

@@ -1,0 +1,259 @@
+"""Files and pictures of a finished DEM run: profile.csv, summary.json, tables of the maps, plots."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mpm.files import write_atomically
+
+from .analysis import Results
+from .box import BoxSpec, Particles
+from .case import DemCase
+from .profile import scaled_to_mean
+from .waveform import Waveform
+
+BASE, BED, FIT = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito: stay apart for colour-blind readers
+
+
+def finite(value: Any) -> Any:
+    """A copy for JSON: numpy scalars as floats, None and numbers that are not finite left out."""
+    if isinstance(value, Mapping):
+        cleaned = {k: finite(v) for k, v in value.items()}
+        return {k: v for k, v in cleaned.items() if v is not None and v != {}}
+    if isinstance(value, list | tuple):
+        return [v for v in (finite(item) for item in value) if v is not None]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return int(value) if isinstance(value, np.integer) else value
+
+
+def write_summary(directory: Path, summary: Mapping[str, Any]) -> None:
+    """summary.json: SI, finite numbers only; what could not be computed is absent."""
+    write_atomically(
+        directory / "summary.json", json.dumps(finite(summary), indent=2, allow_nan=False) + "\n"
+    )
+
+
+def write_tables(directory: Path, case: DemCase, results: Results, waveform: Waveform) -> None:
+    """profile.csv, its fit, the scaled profile when asked, voidage.csv, depth.csv, residence_times.csv."""
+    mean = case.profile.mean_velocity
+    about = f"{case.title}: DEM, seeds {', '.join(map(str, case.run.seeds))}, {waveform.frequency:g} Hz"
+    results.curve.write(
+        directory / "profile.csv",
+        [
+            about,
+            f"cycle mean of u_x {results.curve.mean:.6g} m/s; phase 0: reactor at mean position, moving up",
+        ],
+    )
+    fit = results.fit
+    results.fit.profile.write(
+        directory / "profile_fit.csv",
+        [
+            about,
+            f"piecewise fit: base velocity in contact, flight at u_x = {fit.flight[0]:.6g} m/s from "
+            f"{fit.liftoff:.2f} to {fit.contact:.2f} deg; rms difference to profile.csv {fit.rms:.3g} m/s",
+        ],
+    )
+    if mean is not None:
+        scaled = scaled_to_mean(fit, results.curve, results.base, mean)
+        scaled.profile.write(
+            directory / "profile_scaled.csv",
+            [
+                about,
+                f"SCALED: phases of profile_fit.csv, flight velocity changed from {fit.flight[0]:.6g} to "
+                f"{scaled.flight[0]:.6g} m/s so that the cycle mean is the prescribed {mean:.6g} m/s",
+            ],
+        )
+    d = case.build_powder().diameter
+    heights = results.heights
+    columns = ",".join(f"{phase:.5g}" for phase in results.curve.phase)
+    table = np.column_stack([heights, 1.0 - results.solid.T])
+    _csv(directory / "voidage.csv", f"height_m \\ phase_deg,{columns}", table)
+    filled = results.solid.mean(axis=0) > 0.02
+    _csv(
+        directory / "depth.csv",
+        "height_m,height_d,u_x_m/s,voidage",
+        np.column_stack(
+            [heights, heights / d, results.layer_velocity, 1.0 - results.solid.mean(axis=0)]
+        )[filled],
+    )  # fmt: skip
+    times = np.sort(results.residence[np.isfinite(results.residence)])
+    share = np.arange(1, len(times) + 1) / len(results.residence)
+    _csv(directory / "residence_times.csv", "time_s,share_of_particles", np.column_stack([times, share]))
+
+
+def _csv(path: Path, header: str, rows: np.ndarray) -> None:
+    lines = [header, *(",".join(f"{value:.6g}" for value in row) for row in rows)]
+    write_atomically(path, "\n".join(lines) + "\n")
+
+
+def draw(
+    directory: Path, case: DemCase, results: Results, scene: tuple[BoxSpec, Particles] | None
+) -> list[Path]:
+    """All pictures into directory/plots."""
+    plots = directory / "plots"
+    plots.mkdir(exist_ok=True)
+    figures = {
+        "velocity": _velocity(case, results),
+        "voidage": _voidage(case, results),
+        "depth": _depth(case, results),
+        "residence": _residence(case, results),
+    }
+    if scene is not None:
+        figures["bed"] = _bed(*scene)
+    paths = []
+    for name, figure in figures.items():
+        path = plots / f"{name}.png"
+        figure.savefig(path, dpi=150)
+        paths.append(path)
+    return paths
+
+
+def _velocity(case: DemCase, results: Results) -> Figure:
+    """Bed against base over the cycle, the fit, contact, gap and coordination."""
+    figure = Figure(figsize=(7.0, 7.0), layout="constrained")
+    upper, middle, lower = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 2))
+    phase = results.curve.phase
+    for axis, k, name in ((upper, 0, "along, $u_x$"), (middle, 1, "vertical, $u_y$")):
+        axis.plot(phase, 100 * results.base[k], color=BASE, label="base")
+        axis.plot(phase, 100 * results.curve.velocity[k], color=BED, label="bed (DEM)")
+        axis.plot(phase, 100 * results.fit.profile.velocity[k], color=FIT, ls="--", label="piecewise fit")
+        axis.set_ylabel(f"velocity {name} [cm/s]")
+        axis.fill_between(
+            phase,
+            0,
+            1,
+            where=results.curve.contact < 0.5,
+            transform=axis.get_xaxis_transform(),
+            color="0.92",
+            zorder=0,
+        )
+        axis.axhline(0, color="0.6", lw=0.6)
+    upper.axhline(100 * results.seed_velocities.mean(), color=BED, lw=0.8, ls=":", label="cycle mean")
+    upper.legend(loc="upper right", frameon=False)
+    upper.set_title(f"{case.title} (grey: gap open)", fontsize=10)
+    lower.plot(phase, 1e6 * results.gap, color=BASE)
+    lower.set_ylabel("gap [µm]", color=BASE)
+    other = lower.twinx()
+    other.plot(phase, results.coordination, color=BED)
+    other.set_ylabel("contacts per particle", color=BED)
+    lower.set_xlabel("phase [deg]")
+    lower.set_xlim(0, 360)
+    return figure
+
+
+def _voidage(case: DemCase, results: Results) -> Figure:
+    figure = Figure(figsize=(6.5, 3.6), layout="constrained")
+    axis = figure.subplots()
+    d = case.build_powder().diameter
+    image = axis.pcolormesh(
+        results.curve.phase, results.heights / d, 1.0 - results.solid.T, vmin=0.3, vmax=1.0, cmap="cividis"
+    )
+    figure.colorbar(image, label="voidage")
+    axis.set(xlabel="phase [deg]", ylabel="height above the base [d]", title=case.title)
+    return figure
+
+
+def _depth(case: DemCase, results: Results) -> Figure:
+    figure = Figure(figsize=(4.5, 4.0), layout="constrained")
+    axis = figure.subplots()
+    filled = results.solid.mean(axis=0) > 0.1
+    axis.plot(
+        100 * results.layer_velocity[filled],
+        results.heights[filled] / case.build_powder().diameter,
+        color=BED,
+    )
+    axis.set(
+        xlabel="mean velocity along the base [cm/s]", ylabel="height above the base [d]", title=case.title
+    )
+    return figure
+
+
+def _residence(case: DemCase, results: Results) -> Figure:
+    figure = Figure(figsize=(4.5, 3.4), layout="constrained")
+    axis = figure.subplots()
+    times = results.residence[np.isfinite(results.residence)]
+    if len(times):
+        axis.hist(times, bins=40, range=(0.0, float(np.quantile(times, 0.98))), color=BED)
+    length = 1e3 * case.profile.residence_length
+    axis.set(xlabel=f"time to travel {length:g} mm [s]", ylabel="particles", title=case.title)
+    return figure
+
+
+def _bed(spec: BoxSpec, particles: Particles) -> Figure:
+    """Side view of the last state, coloured by the velocity along the base relative to it."""
+    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axis = figure.subplots()
+    position = particles.position.copy()
+    position[:, 0] %= spec.length
+    order = np.argsort(-position[:, 1])
+    radius = spec.diameters[particles.classes] / 2.0
+    from matplotlib.collections import EllipseCollection
+
+    def spheres(x: np.ndarray, z: np.ndarray, size: np.ndarray | float, **style: Any) -> EllipseCollection:
+        width = np.broadcast_to(1e3 * np.asarray(size), x.shape)
+        offsets = np.column_stack([1e3 * x, 1e3 * z])
+        return EllipseCollection(
+            width,
+            width,
+            np.zeros_like(width),
+            units="xy",
+            offsets=offsets,
+            offset_transform=axis.transData,
+            **style,
+        )
+
+    if not spec.base.flat:
+        glued = spec.base.positions
+        axis.add_collection(spheres(glued[:, 0], glued[:, 2], spec.base.diameter, facecolor="0.6"))
+    bed = spheres(
+        position[order, 0],
+        position[order, 2],
+        2 * radius[order],
+        edgecolor="k",
+        linewidth=0.2,
+        cmap="viridis",
+    )
+    bed.set_array(100 * particles.velocity[order, 0])
+    axis.add_collection(bed)
+    figure.colorbar(bed, label="velocity relative to the base [cm/s]")
+    axis.set(
+        xlim=(0, 1e3 * spec.length), ylim=(-0.05 * 1e3 * spec.length, 1.1e3 * float(position[:, 2].max()))
+    )
+    axis.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
+    return figure
+
+
+def draw_waveform(
+    path: Path,
+    record: tuple[np.ndarray, np.ndarray],
+    waveform: Waveform,
+    spectra: list[tuple[np.ndarray, np.ndarray]],
+) -> None:
+    """Accelerometer data with the fitted harmonics, their spectra, and the displacement they integrate to."""
+    t, acceleration = record
+    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    axes = figure.subplots(2, 3)
+    show = t < 4.0 / waveform.frequency
+    smooth = np.linspace(0.0, 4.0 / waveform.frequency, 800)
+    for row, name in enumerate(("along", "vertical")):
+        axes[row, 0].plot(1e3 * t[show], acceleration[row, show], ".", ms=2, color=BASE, label="data")
+        axes[row, 0].set(xlabel="t [ms]", ylabel=f"{name} [m/s²]")
+        frequency, amplitude = spectra[row]
+        axes[row, 1].plot(frequency, amplitude, color=BASE, lw=0.8)
+        axes[row, 1].set(
+            xlabel="frequency [Hz]", ylabel="amplitude [m/s²]", xlim=(0, min(frequency[-1], 500))
+        )
+        axes[row, 2].plot(
+            1e3 * smooth, waveform.acceleration(smooth)[row], color=BED, label="fit, phase 0 first"
+        )
+        other = axes[row, 2].twinx()
+        other.plot(1e3 * smooth, 1e6 * waveform.displacement(smooth)[row], color=FIT)
+        other.set_ylabel("displacement [µm]", color=FIT)
+        axes[row, 2].set(xlabel="t [ms]", ylabel="fitted [m/s²]")
+    figure.savefig(path, dpi=150)

@@ -1,0 +1,238 @@
+"""All seeds of a powder file: side by side in processes, or over groups of MPI ranks; then the report."""
+
+import multiprocessing
+import queue
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mpm.errors import ConvergenceError, InputError, Interrupted
+from mpm.files import write_atomically
+
+from .analysis import Arrays, analyse
+from .box import Particles, load_lammps
+from .case import DemCase, load_case
+from .report import draw, write_summary, write_tables
+from .simulate import Simulation
+
+Report = Callable[[int, float], None]  # (seed, cycles done)
+
+
+def silent(seed: int, cycles: float) -> None:
+    """No progress report."""
+
+
+def prepare(case: DemCase, directory: Path, resume: bool, overwrite: bool) -> None:
+    """Make the directory and write case.toml; refuse one with something in it unless told what to do."""
+    if directory.exists() and not directory.is_dir():
+        raise InputError(f"{directory}: is a file, not a directory")
+    if directory.exists() and any(directory.iterdir()) and not resume:
+        if not overwrite:
+            raise InputError(
+                f"{directory}: is not empty; use --resume to go on or --overwrite to replace the run"
+            )
+        for old in directory.glob("seed_*"):
+            shutil.rmtree(old)
+        (directory / "summary.json").unlink(missing_ok=True)
+    directory.mkdir(parents=True, exist_ok=True)
+    write_atomically(directory / "case.toml", case.to_toml())
+
+
+def seed_directory(directory: Path, seed: int) -> Path:
+    return directory / f"seed_{seed}"
+
+
+def run_case(
+    case: DemCase,
+    directory: Path,
+    *,
+    jobs: int = 1,
+    resume: bool = False,
+    overwrite: bool = False,
+    report: Report = silent,
+) -> dict[str, Any]:
+    """Run the seeds that are not finished, `jobs` at a time, analyse all and write the report; returns the summary.
+
+    Under MPI the ranks form as many groups as there are seeds (at most), each group taking its share of seeds.
+    """
+    load_lammps()
+    began = time.monotonic()
+    from mpi4py import MPI
+
+    world = MPI.COMM_WORLD
+    if world.rank == 0:
+        failure = None
+        try:
+            prepare(case, directory, resume, overwrite)
+        except InputError as error:
+            failure = error
+    else:
+        failure = None
+    failure = world.bcast(failure, root=0)
+    if failure is not None:
+        raise failure
+    if world.size > 1:
+        _over_ranks(case, directory, resume, report, world)
+    elif jobs > 1 and len(case.run.seeds) > 1:
+        _side_by_side(case, directory, jobs, resume, report)
+    else:
+        for seed in case.run.seeds:
+            Simulation(case, seed, seed_directory(directory, seed)).run(
+                resume, lambda done, s=seed: report(s, done)
+            )
+    summary: dict[str, Any] = {}
+    if world.rank == 0:
+        summary = finish(case, directory, time.monotonic() - began, world.size if world.size > 1 else jobs)
+    return world.bcast(summary, root=0) if world.size > 1 else summary
+
+
+def finish(case: DemCase, directory: Path, seconds: float, workers: int) -> dict[str, Any]:
+    """Analyse what the seeds left and write profile.csv, summary.json, tables and pictures."""
+    simulations = [Simulation(case, seed, seed_directory(directory, seed)) for seed in case.run.seeds]
+    records: list[Arrays] = [s.load_arrays() for s in simulations]
+    masses = [s.spec.masses()[s.filling.classes] for s in simulations]
+    results = analyse(case, simulations[0].spec, masses, records)
+    first = simulations[0]
+    with np.load(first.state_file) as state:
+        last = Particles(state["position"], state["speed"], state["spin"], state["classes"])
+    write_tables(directory, case, results, first.waveform)
+    draw(directory, case, results, (first.spec, last))
+    summary = {
+        "status": "done",
+        "title": case.title,
+        "powder": first.spec.powder.name,
+        "seeds": list(case.run.seeds),
+        "cycles": case.run.cycles,
+        "discarded_cycles": case.run.discard,
+        "frequency": first.waveform.frequency,
+        "particles": len(masses[0]),
+        "box": {
+            "length": first.spec.length,
+            "depth": first.spec.depth,
+            "stiffness": first.spec.stiffness,
+            "timestep": first.timestep,
+            "steps_per_cycle": first.steps * case.run.updates_per_cycle,
+        },
+        **results.summary,
+        "wall_seconds": seconds,
+        "workers": workers,
+        "versions": {name: version(name) for name in ("mpm", "lammps", "numpy", "scipy")},
+    }
+    write_summary(directory, summary)
+    return summary
+
+
+# Several seeds at a time -------------------------------------------------------------------------------
+
+
+def _work(toml_path: Path, seed: int, resume: bool, messages: Any) -> None:
+    """One seed in its own process; reports progress and the outcome through the queue."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    last = 0.0
+
+    def progress(done: float) -> None:
+        nonlocal last
+        if time.monotonic() - last > 0.3:
+            last = time.monotonic()
+            messages.put((seed, "cycles", done))
+
+    try:
+        case = load_case(toml_path)
+        Simulation(case, seed, seed_directory(toml_path.parent, seed)).run(resume, progress)
+    except (InputError, ConvergenceError) as error:
+        messages.put((seed, "failed", error))
+    else:
+        messages.put((seed, "done", None))
+
+
+def _side_by_side(case: DemCase, directory: Path, jobs: int, resume: bool, report: Report) -> None:
+    context = multiprocessing.get_context("spawn")
+    messages = context.Queue()
+    waiting = list(case.run.seeds)
+    active: dict[int, Any] = {}
+    try:
+        while waiting or active:
+            while waiting and len(active) < jobs:
+                seed = waiting.pop(0)
+                active[seed] = context.Process(
+                    target=_work, args=(directory / "case.toml", seed, resume, messages), daemon=True
+                )
+                active[seed].start()
+            try:
+                seed, kind, content = messages.get(timeout=0.5)
+            except queue.Empty:
+                for seed, process in active.items():
+                    if not process.is_alive() and messages.empty():
+                        raise ConvergenceError(
+                            f"seed {seed}: its process ended without a word (exit code {process.exitcode})"
+                        ) from None
+                continue
+            if kind == "cycles":
+                report(seed, content)
+            elif kind == "failed":
+                raise type(content)(f"seed {seed}: {content}")
+            else:
+                report(seed, float(case.run.cycles))
+                active.pop(seed).join()
+    finally:
+        for process in active.values():
+            process.terminate()
+            process.join()
+
+
+def _over_ranks(case: DemCase, directory: Path, resume: bool, report: Report, world: Any) -> None:
+    """Groups of ranks, each with its share of the seeds; a failure in one is raised by all."""
+    seeds = case.run.seeds
+    groups = min(len(seeds), world.size)
+    mine = world.rank * groups // world.size
+    comm = world.Split(mine, world.rank)
+    failure: ConvergenceError | InputError | None = None
+    try:
+        for seed in seeds[mine::groups]:
+            where = seed_directory(directory, seed)
+            simulation = Simulation(case, seed, where, comm)
+            if world.rank == 0:
+                simulation.run(resume, partial(report, seed))
+            else:
+                simulation.run(resume)
+    except (ConvergenceError, InputError) as error:
+        failure = type(error)(f"seed {seed}: {error}")
+    finally:
+        comm.Free()
+    failures = [f for f in world.allgather(failure) if f is not None]
+    if failures:
+        raise failures[0]
+
+
+def interrupted(directory: Path) -> Interrupted:
+    return Interrupted(
+        f"interrupted; whole cycles are kept, go on with: mpm dem {directory / 'case.toml'} --resume"
+    )
+
+
+def progress_bar(case: DemCase, shown: bool) -> tuple[Report, Callable[[], None]]:
+    """(report, close): a bar on standard error over the cycles of all seeds, or nothing."""
+    if not shown:
+        return silent, (lambda: None)
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.1f}/{task.total:.0f} cycles"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(file=sys.stderr),
+    )
+    tasks = {seed: bar.add_task(f"seed {seed}", total=case.run.cycles) for seed in case.run.seeds}
+    bar.start()
+    return (lambda seed, cycles: bar.update(tasks[seed], completed=cycles)), bar.stop
