@@ -69,7 +69,7 @@ class Scatter:
         local = np.asarray(local, dtype=np.float64)
         lead = local.shape[:-1]
         width = int(np.prod(lead, dtype=np.int64))
-        send = np.ascontiguousarray(local.reshape(width, -1).T)
+        send = np.ascontiguousarray(local.reshape(width, local.shape[-1]).T)
         received = np.empty((self.size, width))
         self.comm.Allgatherv(send, [received, self.counts * width])
         return self._ordered(received, lead)
@@ -79,7 +79,7 @@ class Scatter:
         local = np.asarray(local, dtype=np.float64)
         lead = local.shape[:-1]
         width = int(np.prod(lead, dtype=np.int64))
-        send = np.ascontiguousarray(local.reshape(width, -1).T)
+        send = np.ascontiguousarray(local.reshape(width, local.shape[-1]).T)
         received = np.empty((self.size, width)) if is_root(self.comm) else None
         self.comm.Gatherv(send, None if received is None else [received, self.counts * width], root=0)
         return None if received is None else self._ordered(received, lead)

@@ -253,7 +253,7 @@ class Reactor:
         transport, bed, comm, grid = self.transport, self.bed, self.comm, self.grid
         ledger = transport.ledger
         fed, out, back, volume = (total(comm, v) for v in (ledger.fed, ledger.out, ledger.back, ledger.out_volume))
-        surface = bed.scatter.to_all(ledger.surface_events) if len(ledger.surface_events) else np.zeros((0, 0))
+        surface = bed.scatter.to_all(ledger.surface_events) 
         zones = grid.zone_of_column[self.strip.column[: self.strip.owned]]
         count = len(self.case.geometry.zones) + 1
         gas = np.array([np.bincount(zones, e, count) for e in ledger.gas_events]).reshape(-1, count)
