@@ -85,9 +85,7 @@ def run_case(
         _side_by_side(case, directory, jobs, resume, report)
     else:
         for seed in case.run.seeds:
-            Simulation(case, seed, seed_directory(directory, seed)).run(
-                resume, lambda done, s=seed: report(s, done)
-            )
+            Simulation(case, seed, seed_directory(directory, seed)).run(resume, partial(report, seed))
     summary: dict[str, Any] = {}
     if world.rank == 0:
         summary = finish(case, directory, time.monotonic() - began, world.size if world.size > 1 else jobs)
