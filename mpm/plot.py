@@ -22,6 +22,7 @@ import matplotlib as mpl
 import numpy as np
 from cycler import cycler
 from matplotlib import style
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -94,7 +95,7 @@ def history_figure(run: Run) -> Figure:
                 text = f"{inlet}: {kind.replace('_', ' ')}"
                 panel.plot(time, values, dashes[kind], color=colour, label=text)
             else:
-                panel.semilogy(time, positive(np.abs(values)), label=formula(key.split(".", 1)[1]))
+                plot_log(panel, time, np.abs(values), formula(key.split(".", 1)[1]))
         panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
         panel.grid(alpha=0.25)
     if titration:
@@ -118,7 +119,7 @@ def outlets_figure(run: Run) -> Figure:
     for panel, name in zip(axes.flat, names, strict=False):
         for one, values in outlet_species(run, name).items():
             colour = OKABE_ITO[list(species).index(one) % len(OKABE_ITO)]
-            panel.semilogy(run.history["time"], positive(values), color=colour, label=formula(one))
+            plot_log(panel, run.history["time"], values, formula(one), colour)
         panel.set_title(f"outlet {name}", fontsize=9)
         panel.grid(alpha=0.25)
     if largest > 0.0:
@@ -140,9 +141,10 @@ def outlet_species(run: Run, outlet: str) -> dict[str, Floats]:
     return {name: run.history[key] for name, key in keys.items() if key in run.history}
 
 
-def positive(values: Floats) -> Floats:
-    """The values for a logarithmic axis: gaps (NaN) where they are zero or negative."""
-    return np.where(values > 0.0, values, np.nan)
+def plot_log(axes: Axes, time: Floats, values: Floats, label: str, colour: str | None = None) -> None:
+    """A curve on a logarithmic axis, with gaps where it is zero; the label says so of one that is zero throughout."""
+    shown = np.where(values > 0.0, values, np.nan)
+    axes.semilogy(time, shown, color=colour, label=label if np.isfinite(shown).any() else f"{label} (zero)")
 
 
 def exits(run: Run) -> list[tuple[str, str, str, int]]:

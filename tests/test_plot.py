@@ -172,7 +172,7 @@ def test_history_curves(cycle: Run) -> None:
     for inlet in dosing_inlets(cycle.case):
         assert np.array_equal(titration[f"{inlet.name}: box mean"], TIMES / 4)
         assert np.array_equal(titration[f"{inlet.name}: exit mean"], TIMES / 2)
-    assert np.allclose(balance["TMA"][1:], 1e-13 * TIMES[1:]) and np.isnan(balance["sites"]).all()
+    assert np.allclose(balance["TMA"][1:], 1e-13 * TIMES[1:]) and np.isnan(balance["sites (zero)"]).all()
     assert figure.axes[1].get_yscale() == "log" and figure.axes[1].get_xlabel() == "time [s]"
 
 
