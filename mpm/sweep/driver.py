@@ -178,7 +178,8 @@ def _drive(
         "points_seconds": collector.seconds,
         "driver_processor_seconds": time.process_time() - processor,
     }
-    if not results.save(about):
+    results.save(about)
+    if not results.save_parquet():
         say("results.parquet is not written: pyarrow is not installed (pip install 'mpm[sweep]')")
     counts = results.counts()
     say(

@@ -44,6 +44,7 @@ STATUS = {0: "done", 2: "bad_input", 3: "failed", 130: "interrupted", guard.LOCK
 """By exit status; above 128: "killed"; anything else: "crashed"."""
 VERDICTS = ("done", "failed", "bad_input")
 """Final for one version of the program; every other point is run again by the next call."""
+GUARD_KILLED = 128 + signal.SIGKILL
 GRACE = 10.0
 """Seconds that a point gets to save its restart state when it is told to stop."""
 PATIENCE = 60.0
@@ -168,29 +169,64 @@ def attempt(task: Task, number: int, resume: bool, watch: Watch) -> int:
             "resumed": resume,
         },
     }
-    process = subprocess.Popen(
-        [sys.executable, "-I", "-S", guard.__file__, json.dumps(order)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env=clean_environment(os.environ),
-        start_new_session=True,
-    )
-    assert process.stdin is not None
+    watchman = getattr(_slot, "watchman", None)
+    if watchman is None or not watchman.ready():
+        watchman = _slot.watchman = Watchman()
     ended = threading.Event()
 
-    def stop_when_abandoned(pipe: Any = process.stdin) -> None:
+    def stop_when_abandoned() -> None:
         if watch.wait(ended):
-            pipe.close()
+            watchman.stop()
 
     watcher = threading.Thread(target=stop_when_abandoned, daemon=True)
     watcher.start()
     try:
-        return process.wait()
+        return watchman.run(order)
     finally:
         ended.set()
         watcher.join()
-        process.stdin.close()
+
+
+class Watchman:
+    """A guard process at our service (`mpm.sweep.guard`); each thread that runs points keeps one."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-I", "-S", guard.__file__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=clean_environment(os.environ),
+            start_new_session=True,
+        )
+
+    def __del__(self) -> None:
+        self._process.communicate()  # the end of its orders is the guard's end
+
+    def ready(self) -> bool:
+        """Whether it lives."""
+        return self._process.poll() is None
+
+    def run(self, order: Mapping[str, Any]) -> int:
+        """Hand over an order and wait for the exit status; as of a killed point when the guard itself was killed."""
+        assert self._process.stdin is not None and self._process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.write(json.dumps(order).encode() + b"\n")
+            self._process.stdin.flush()
+            answer = self._process.stdout.readline()
+            if answer:
+                return int(answer)
+        self._process.wait()
+        return GUARD_KILLED
+
+    def stop(self) -> None:
+        """Let the present point stop; from any thread."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError, ValueError):
+            os.write(self._process.stdin.fileno(), guard.STOP + b"\n")
+
+
+_slot = threading.local()
 
 
 def run_point(task: Task) -> dict[str, Any]:
@@ -218,9 +254,8 @@ def run_point(task: Task) -> dict[str, Any]:
     if status == 2 and resume:
         status = attempt(task, number, False, watch)
     stale = STALE_FORM.search(last_line(layout.log(task.name)))
-    if (
-        status not in (0, guard.LOCK_TAKEN) and stale
-    ):  # a process killed in the middle of compiling a form left it
+    if stale and status not in (0, guard.LOCK_TAKEN):
+        # A process killed in the middle of compiling a form has left it behind; everybody would wait for it.
         Path(stale.group(1)).unlink(missing_ok=True)
-        attempt(task, number, any(run.glob("checkpoint.*")), watch)
-    return read_json(record) or {"exit_status": guard.LOCK_TAKEN if status == guard.LOCK_TAKEN else 137}
+        status = attempt(task, number, any(run.glob("checkpoint.*")), watch)
+    return read_json(record) or {"exit_status": status}

@@ -91,14 +91,16 @@ class Results:
         known = {name for numbers in self._numbers.values() for name in numbers}
         return [name for name in choose(self.sweep.columns, ()) if known and name not in known]
 
-    def save(self, about: Mapping[str, Any]) -> bool:
-        """Write results.csv, sweep.json and results.parquet; False when pyarrow for the last is missing."""
-        rows, columns = self.rows(), self.columns()
-        write_csv(self.layout.root / "results.csv", columns, rows)
-        write_atomically(
-            self.layout.root / "sweep.json", json.dumps(provenance(self) | dict(about), indent=1) + "\n"
-        )
-        return write_parquet(self.layout.root / "results.parquet", columns, rows, {"title": self.sweep.title})
+    def save(self, about: Mapping[str, Any]) -> None:
+        """Write results.csv and sweep.json."""
+        text = json.dumps(provenance(self) | dict(about), indent=1)
+        write_csv(self.layout.root / "results.csv", self.columns(), self.rows())
+        write_atomically(self.layout.root / "sweep.json", text + "\n")
+
+    def save_parquet(self) -> bool:
+        """Write results.parquet; False when pyarrow is not installed."""
+        about = {"title": self.sweep.title, "program": program()}
+        return write_parquet(self.layout.root / "results.parquet", self.columns(), self.rows(), about)
 
 
 def provenance(results: Results) -> dict[str, Any]:
