@@ -37,7 +37,7 @@ def check_case(case: Case) -> dict[str, Any]:
         },
         "run": {
             "steps": eng.expected_steps(case),
-            "peak_memory_bytes": eng.expected_memory(grid.cells),
+            "peak_memory_bytes": eng.expected_memory(case, grid.cells),
             "flow_courant": eng.flow_courant(case, grid),
         },
         "gas": {

@@ -218,7 +218,8 @@ def dem(context: typer.Context) -> None:
     """Simulate a vibrated powder bed and write its velocity profile (see mpm dem --help)."""
     from mpm.dem.cli import app as dem_app
 
-    typer.main.get_command(dem_app).main(context.args, prog_name="mpm dem", standalone_mode=False)
+    status = typer.main.get_command(dem_app).main(context.args, prog_name="mpm dem", standalone_mode=False)
+    raise typer.Exit(status if isinstance(status, int) else 0)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -14,10 +14,12 @@ from mpm.geometry import Grid
 from mpm.layout import Inlet
 from mpm.materials import Material
 
-PEAK_MEMORY_BASE = 0.35e9
-"""Memory of one rank before it holds a mesh: interpreter, PETSc, MPI [bytes]."""
-PEAK_MEMORY_PER_CELL = 9e3
-"""Memory for each cell: flow factors, the stored cycle, transport operators, fields [bytes]."""
+MEMORY_OF_A_RANK = 0.15e9
+"""Interpreter, PETSc and MPI before there is a mesh [bytes]."""
+MEMORY_OF_A_CELL = 17.5e3
+"""Flow factors, operators and fields [bytes]; measured, as the next one, at 28,000 and 99,000 cells."""
+MEMORY_OF_A_CELL_AND_PHASE = 0.45e3
+"""Operators of one phase of the cycle in the resolved fidelity [bytes]."""
 
 
 def excess_number(
@@ -182,6 +184,7 @@ def expected_steps(case: Case) -> int:
     return sum(math.ceil(span * rate * (1.0 - 1e-12)) for span in (before, time.end - before))
 
 
-def expected_memory(cells: int, ranks: int = 1) -> float:
+def expected_memory(case: Case, cells: int, ranks: int = 1) -> float:
     """Peak memory [bytes] of a run over all ranks, from measurements on this program; good to a factor of 1.5."""
-    return ranks * PEAK_MEMORY_BASE + cells * PEAK_MEMORY_PER_CELL
+    phases = case.time.steps_per_cycle if case.fidelity == "resolved" else 0
+    return ranks * MEMORY_OF_A_RANK + cells * (MEMORY_OF_A_CELL + phases * MEMORY_OF_A_CELL_AND_PHASE)
