@@ -275,7 +275,8 @@ def _end(status: int, line: str) -> int:
     deadline = time.monotonic() + _PATIENCE
     while not arrived.Test():
         if time.monotonic() > deadline:  # the others are in a call that this rank will never join
-            print(f"[rank {rank()}] {line}", file=sys.stderr, flush=True)
+            if rank() != 0:
+                print(f"[rank {rank()}] {line}", file=sys.stderr, flush=True)
             mpi.COMM_WORLD.Abort(status)
         time.sleep(0.01)
     return status
