@@ -199,7 +199,7 @@ class BoxInput(Section):
     baffle_height: Length = 2e-3
     baffle_width: Length = 2e-3
     declination: Tilt = 0.0
-    steps_per_collision: Annotated[float, Dimension("", "steps", "14", at_least=2.0)] = 14.0
+    steps_per_collision: Annotated[float, Dimension("", "steps", "14", at_least=1.0)] = 14.0
 
 
 class GasInput(Section):
