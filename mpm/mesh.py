@@ -84,8 +84,8 @@ def read_msh(case: Case, path: Path) -> QuadMesh:
     if not path.is_file():
         raise InputError(f"{path}: no such mesh file")
     try:
-        raw = meshio.read(path)
-    except meshio.ReadError as error:
+        raw = meshio.gmsh.read(path)  # meshio.read ends the whole program when it fails
+    except (meshio.ReadError, ValueError, IndexError, KeyError) as error:
         raise InputError(f"{path}: not a readable gmsh file ({error})") from error
     blocks, lines = [], {}
     for name, per_block in raw.cell_sets.items():

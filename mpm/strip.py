@@ -146,7 +146,7 @@ def _periodic_mesh(grid: Grid, quads: QuadMesh | None, comm: MPI.Comm) -> dolfin
     geometry = dolfinx.mesh.create_geometry(
         node_map,
         np.arange(4 * count, dtype=np.int32).reshape(count, 4),
-        flat.geometry.cmap,
+        flat.geometry.cmaps[0],
         np.ascontiguousarray(corners.reshape(-1, 3)[:, :2]),
         identity.ravel().astype(np.int64),
     )
