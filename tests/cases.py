@@ -1,0 +1,145 @@
+"""Small cases, the laws that every run must obey, and convergence rates: what the tests of the solver share."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mpm.fem  # noqa: F401  (loads the finite-element stack before mpi4py)
+from mpm.case import Case, load_case
+from mpm.diagnostics import element_balances, site_balance, species_balances
+from mpm.flow import boundary_flows, face_flow
+from mpm.parallel import largest
+from mpm.reactor import Reactor, Result
+from mpm.strip import BOTTOM, LEFT, RIGHT, TOP
+
+from mpi4py import MPI  # isort: skip  (after mpm.fem)
+
+CASES = Path(__file__).parents[1] / "cases"
+
+COARSE = {
+    "geometry.cell_width": "2.33 mm",
+    "geometry.layer.plenum.cells": 4,
+    "geometry.layer.frit.cells": 3,
+    "geometry.layer.bed.cells": 4,
+    "geometry.layer.headspace.cells": 8,
+}
+TINY = {
+    "geometry.cell_width": "5 mm",
+    "geometry.layer.plenum.cells": 3,
+    "geometry.layer.frit.cells": 2,
+    "geometry.layer.bed.cells": 3,
+    "geometry.layer.headspace.cells": 4,
+}
+SHORT = {"time.end": "1 s", "output.every": "0.25 s"}
+
+
+def zone(changes: Mapping[str, Any] | None = None, mesh: Mapping[str, Any] = COARSE) -> Case:
+    """The single TMA zone on a coarse mesh."""
+    return load_case(CASES / "single_zone.toml", {**mesh, **(changes or {})})
+
+
+def cycle(changes: Mapping[str, Any] | None = None, mesh: Mapping[str, Any] = COARSE) -> Case:
+    """The single cycle of TMA and water on a coarse mesh: both half-reactions and the gas reaction."""
+    return load_case(CASES / "single_cycle.toml", {**mesh, "geometry.cell_width": "4.66 mm", **(changes or {})})
+
+
+def strip_case(layers: Sequence[Mapping[str, Any]], columns: int = 3, length: float = 3e-3, **tables: Any) -> Case:
+    """A strip of `length` [m] with these layers and no ports unless `geometry` brings them; the rest by table."""
+    geometry = {
+        "length": f"{length!r} m",
+        "cell_width": f"{length / columns!r} m",
+        "layer": [dict(layer) for layer in layers],
+        **tables.pop("geometry", {}),
+    }
+    return load_case({"geometry": geometry, "motion": {"gamma": 0.0, "bed_velocity": "0 m/s"}, **tables})
+
+
+def column_case(height: float, cells: int, velocity: float, material: Mapping[str, Any], **tables: Any) -> Case:
+    """Plug flow upwards: one porous layer, an inlet as wide as the strip below it and an outlet as wide above it."""
+    length = 3e-3
+    port = {"center": f"{0.5 * length!r} m", "width": f"{length!r} m"}
+    inlet = {"name": "in", "velocity": f"{velocity!r} m/s", **port, **tables.pop("inlet", {})}
+    geometry = {"inlet": [inlet], "outlet": [{"name": "out", **port}], **tables.pop("geometry", {})}
+    layer = {"name": "packing", "height": f"{height!r} m", "cells": cells, "material": "packing"}
+    return strip_case([layer], length=length, geometry=geometry, material={"packing": dict(material)}, **tables)
+
+
+def assert_laws(reactor: Reactor) -> None:
+    """Assert what holds in every run at any time; collective, and usable as the callback of a run.
+
+    Species, sites and elements balance to 1e-9; no concentration lies below -1e-14 of the feed; coverages lie in [0, 1] and sum to 1;
+    div u of any cell is below 1e-10 of the inflow, in every velocity field in use; what flows in flows out.
+    """
+    case, comm, strip = reactor.case, reactor.comm, reactor.strip
+    totals = reactor.totals()
+    errors = {name: entry["balance_error"] for name, entry in species_balances(case, totals).items()}
+    errors |= {"sites": site_balance(case, totals), **element_balances(case, totals)}
+    assert max(errors.values()) <= 1e-9, f"t = {reactor.time:g} s: balances {errors}"
+
+    transport, theta = reactor.transport, reactor.bed.theta
+    lowest = -largest(comm, [-transport.concentration.min(initial=0.0)])[0]
+    assert lowest >= -1e-14 * transport.largest_feed, f"t = {reactor.time:g} s: concentration {lowest:g} mol/m3"
+    assert np.all(np.isfinite(transport.concentration))
+    assert theta.min(initial=0.0) >= 0.0 and theta.max(initial=0.0) <= 1.0, f"coverage {theta.min()} ... {theta.max()}"
+    np.testing.assert_allclose(theta.sum(axis=0), 1.0, rtol=0.0, atol=1e-11)
+
+    assert reactor.flows is not None
+    fields = getattr(reactor.flows, "fields", None) or [reactor.flows.current]
+    height, dx = strip.height[: strip.owned], strip.grid.dx
+    inflow = sum(i.velocity * i.width for i in case.geometry.inlets)
+    for field in fields:
+        u = field.velocities[:, : strip.owned]
+        net = (u[RIGHT] - u[LEFT]) * height + (u[TOP] - u[BOTTOM]) * dx
+        worst, fastest = largest(comm, [np.abs(net).max(initial=0.0), np.abs(u).max(initial=0.0)])
+        scale = inflow or fastest * dx
+        assert worst <= 1e-10 * scale, f"div u is {worst / scale:.2g} of the inflow"
+        flows = boundary_flows(case, strip, face_flow(strip, field.velocities))
+        assert abs(sum(flows.values())) <= 1e-10 * scale, f"port flows {flows}"
+
+
+def run(case: Case, comm: MPI.Comm = MPI.COMM_SELF, **options: Any) -> tuple[Reactor, Result]:
+    """Run `case` and check the laws at every output time."""
+    reactor = Reactor(case, comm)
+    result = reactor.run(callback=assert_laws, **options)
+    assert_laws(reactor)
+    return reactor, result
+
+
+def rate(sizes: Sequence[float], errors: Sequence[float]) -> float:
+    """Order of convergence: slope of log(error) over log(size), fitted."""
+    return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
+
+
+def norm(error: Any, weights: Any = None) -> float:
+    """Root mean square of an error, weighted."""
+    return float(np.sqrt(np.average(np.square(error), weights=weights)))
+
+
+BOOKKEEPING = {"ranks", "wall_seconds", "versions", "status", "title", "fidelity", "balance_error", "mass_error"}
+
+
+def physical_numbers(summary: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+    """Flat dotted names of all physical numbers of a summary: what must not depend on the ranks. Errors of balances are rounding."""
+    numbers: dict[str, float] = {}
+    for key, value in summary.items():
+        if key in BOOKKEEPING:
+            continue
+        if isinstance(value, Mapping):
+            numbers |= physical_numbers(value, f"{prefix}{key}.")
+        elif isinstance(value, list):
+            numbers |= {f"{prefix}{key}.{i}": float(v) for i, v in enumerate(value)}
+        else:
+            numbers[f"{prefix}{key}"] = float(value)
+    return numbers
+
+
+def assert_same_numbers(one: Mapping[str, Any], other: Mapping[str, Any], tolerance: float) -> None:
+    """Assert that two summaries agree in every physical number, relative to the number (floor: 1e-6 of the feed for amounts)."""
+    a, b = physical_numbers(one), physical_numbers(other)
+    assert a.keys() == b.keys()
+    amounts = [v["fed"] for v in one["species"].values()]
+    for name, value in a.items():
+        floor = 1e-6 * max(amounts) if name.startswith("species.") else 1e-9
+        assert abs(value - b[name]) <= tolerance * max(abs(value), abs(b[name]), floor), f"{name}: {value!r}, {b[name]!r}"
