@@ -229,6 +229,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             result = typer.main.get_command(app).main(
                 list(sys.argv[1:] if arguments is None else arguments), prog_name="mpm", standalone_mode=False
             )
+            if result == Interrupted.exit_status:  # typer makes this of a KeyboardInterrupt
+                return _end(Interrupted.exit_status, "interrupted")
             return result if isinstance(result, int) else 0
         except MpmError as error:
             return _end(error.exit_status, str(error))
@@ -238,10 +240,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _end(
                 InputError.exit_status, f"mpm: {error.format_message()} (mpm --help lists what there is)"
             )
-        except BrokenPipeError:
-            os.dup2(
-                os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno()
-            )  # the reader of our output has gone
+        except BrokenPipeError:  # the reader of our output has gone; let nothing more reach the pipe
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except Exception:
             _crash()
