@@ -211,7 +211,8 @@ def read_profile(path: Path) -> tuple[Floats, Floats]:
 
     The first point is repeated one turn later, so that linear interpolation closes the cycle.
     """
-    table = np.genfromtxt(path, delimiter=",", names=True, comments="#", deletechars="", replace_space="_")
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"]
+    table = np.genfromtxt(lines, delimiter=",", names=True, comments=None, deletechars="", replace_space="_")
     phase = np.radians(np.atleast_1d(table["phase_deg"]))
     velocity = np.atleast_1d(table["u_x_m/s"])
     inside = (phase >= 0.0) & (phase < TURN * (1.0 - 1e-12))
