@@ -12,6 +12,8 @@ concentration (a Newton iterate) leaves Q as it is at zero and enters r_r linear
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -65,6 +67,20 @@ def stoichiometry(reaction) -> dict[str, float]:
     return reaction.nu_gas if hasattr(reaction, "nu_gas") else reaction.nu
 
 
+@dataclass(frozen=True, eq=False)
+class Exposure:
+    """Solids conveyed through cells: mean `rates` (reactions, n) [mol/m2/s] with derivatives by concentration `rates_c`
+    (reactions, coupled, n) and by incoming coverage `rates_theta` (reactions, sites, n); outgoing coverage `out` (sites, n), likewise
+    `out_c` (sites, coupled, n) and `out_theta` (sites, sites, n)."""
+
+    rates: Floats
+    rates_c: Floats
+    rates_theta: Floats
+    out: Floats
+    out_c: Floats
+    out_theta: Floats
+
+
 class SurfaceKinetics:
     """Surface reactions in `n` cells with area `surface` S [1/m] and `sites` n_s [mol/m2], temperature [K] scalar or per cell."""
 
@@ -80,13 +96,19 @@ class SurfaceKinetics:
         self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(-1, len(names))
         self.nu_gas = np.array([[r.nu_gas.get(k, 0.0) for k in coupled] for r in self.reactions]).reshape(-1, len(coupled))
 
+    def part(self, chosen: NDArray[np.integer]) -> SurfaceKinetics:
+        """The same reactions in some of the cells."""
+        other = copy.copy(self)
+        other.surface, other.sites = self.surface[chosen], self.sites[chosen]
+        other.constant = [constant[chosen] for constant in self.constant]
+        return other
+
     def coverage(self, concentration: Floats, theta: Floats, dt: float) -> Floats:
         """theta' (sites, n) after `dt` [s] at the new concentrations (coupled, n) [mol/m3]."""
         rates = self._site_rates(concentration)
         if len(theta) == 2:
             return self._two_sites(rates, theta, dt)[0]
-        matrix = np.eye(len(theta)) - dt * np.einsum("rk,rn,rs->nks", self.nu_site, rates, self._consumed(len(theta)))
-        return np.linalg.solve(matrix, theta.T[:, :, None])[:, :, 0].T
+        return np.minimum(self._solve_sites(rates, dt, theta[:, None, :])[:, 0], 1.0)
 
     def rates(self, concentration: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
         """Rates r_r (reactions, n) [mol/m2/s] at the end of the step and their derivatives (reactions, coupled, n) [m/s]."""
@@ -95,12 +117,11 @@ class SurfaceKinetics:
         if k == 2:
             new, response = self._two_sites(site_rates, theta, dt)
         else:
-            consumed = self._consumed(k)
-            matrix = np.eye(k) - dt * np.einsum("rk,rn,rs->nks", self.nu_site, site_rates, consumed)
-            inverse = np.linalg.inv(matrix)
-            new = np.einsum("nks,sn->kn", inverse, theta)
+            identity = np.broadcast_to(np.eye(k)[:, :, None], (k, *theta.shape))
+            inverse = self._solve_sites(site_rates, dt, identity)
+            new = np.einsum("ksn,sn->kn", inverse, theta)
             # d theta'/d q_r = (I - dt Q)^-1 dt nu_r theta'_s(r)
-            response = dt * np.einsum("nks,rs,rn->rkn", inverse, self.nu_site, new[self.site])
+            response = dt * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, new[self.site])
         values = np.empty((len(self.reactions), concentration.shape[1]))
         slopes = np.zeros((len(self.reactions), *concentration.shape))
         for r, (g, s) in enumerate(zip(self.gas, self.site, strict=True)):
@@ -112,6 +133,66 @@ class SurfaceKinetics:
                 slopes[r, j] += self.constant[r] * concentration[g] * slope
         return values, slopes
 
+    def conveyed(self, concentration: Floats, theta: Floats, time: Floats | float) -> Exposure:
+        """Solids that pass a cell in `time` [s, scalar or (n,)] at constant concentrations, coming in with `theta` (sites, n).
+
+        Two kinds of sites: exact, d theta_0/dt = c (1 - theta_0) - a theta_0, so theta_out = theta_in exp(-a - c) + c phi_1(a + c)
+        with a and c the turnovers over `time`; with one reaction that is theta_out = theta_in exp(-nu k C time/n_s). More kinds: implicit
+        in the outgoing coverage. Mean rates and outgoing coverage balance exactly in both.
+        """
+        rates = self._site_rates(concentration)
+        k, count = len(theta), len(self.reactions)
+        unit = np.eye(k)
+        if k == 2:
+            gain, share = self._gains(rates, theta, time)
+            turnover = gain[0] + gain[1]
+            decay, one, two = np.exp(-turnover), phi1(turnover), phi2(turnover)
+            out, mean = theta * decay + gain * one, theta * one + gain * two
+            slope_one = dphi1(turnover)
+            slope_two = dphi2(turnover)
+            out_q, mean_q = np.empty((count, *theta.shape)), np.empty((count, *theta.shape))
+            for r, s in enumerate(self.site):
+                through = share[r, 1 - s]  # d turnover / d q_r
+                out_q[r] = through * (-theta * decay + gain * slope_one)
+                mean_q[r] = through * (theta * slope_one + gain * slope_two)
+                out_q[r, 1 - s] += through * one
+                mean_q[r, 1 - s] += through * two
+            out_theta = unit[:, :, None] * decay
+            mean_theta = unit[:, :, None] * one
+        else:
+            span = np.broadcast_to(np.asarray(time, dtype=float), theta.shape[1:])
+            matrix = unit - span[:, None, None] * np.einsum("rk,rn,rs->nks", self.nu_site, rates, self._consumed(k))
+            inverse = np.linalg.inv(matrix)
+            out = mean = np.einsum("nks,sn->kn", inverse, theta)
+            out_q = mean_q = span * np.einsum("nks,rs,rn->rkn", inverse, self.nu_site, out[self.site])
+            out_theta = mean_theta = np.moveaxis(inverse, 0, -1)
+        values = np.stack([self.constant[r] * concentration[g] * mean[s] for r, (g, s) in enumerate(self._pairs())])
+        slopes = np.zeros((count, *concentration.shape))
+        out_c = np.zeros((k, *concentration.shape))
+        values_theta = np.zeros((count, *theta.shape))
+        for r, (g, s) in enumerate(self._pairs()):
+            slopes[r, g] += self.constant[r] * mean[s]
+            values_theta[r] = self.constant[r] * concentration[g] * mean_theta[s]
+            for other, j in enumerate(self.gas):
+                dq = self.constant[other] / self.sites * (concentration[j] > 0.0)
+                slopes[r, j] += self.constant[r] * concentration[g] * mean_q[other, s] * dq
+        for other, j in enumerate(self.gas):
+            out_c[:, j] += out_q[other] * (self.constant[other] / self.sites * (concentration[j] > 0.0))
+        return Exposure(values, slopes, values_theta, out, out_c, out_theta)
+
+    def _pairs(self) -> list[tuple[int, int]]:
+        return list(zip(self.gas, self.site, strict=True))
+
+    def _gains(self, rates: Floats, theta: Floats, time: Floats | float) -> tuple[Floats, Floats]:
+        """For two kinds: turnover into each kind over `time` (2, n), and its derivative by each q_r (reactions, 2, n or 1)."""
+        span = np.atleast_1d(np.asarray(time, dtype=float))
+        gain = np.zeros_like(theta)
+        share = np.zeros((len(self.reactions), 2, len(span)))
+        for r, s in enumerate(self.site):
+            share[r, 1 - s] = span * self.nu_site[r, 1 - s]
+            gain[1 - s] += share[r, 1 - s] * rates[r]
+        return gain, share
+
     def _site_rates(self, concentration: Floats) -> Floats:
         """q_r = k_r C_g / n_s [1/s], never negative."""
         rates = np.empty((len(self.reactions), concentration.shape[1]))
@@ -119,9 +200,27 @@ class SurfaceKinetics:
             rates[r] = self.constant[r] * np.maximum(concentration[g], 0.0) / self.sites
         return rates
 
-    def _consumed(self, k: int) -> Floats:
-        """(reactions, sites): 1 where the reaction's rate is first order in the site."""
-        return np.eye(k)[self.site].reshape(-1, k)
+    def _solve_sites(self, rates: Floats, dt: float, rhs: Floats) -> Floats:
+        """Solve (I - dt Q) x = rhs for any number of sites; rhs and x (sites, m, n), rhs >= 0.
+
+        Elimination without subtraction (Grassmann, Taksar and Heyman 1985): only the turnovers from site to site and the column sums
+        enter, all positive, so sites are conserved to rounding however much faster than the step the reactions are.
+        """
+        k = len(rhs)
+        turnover = dt * np.einsum("rk,rn,rs->ksn", self.nu_site, rates, np.eye(k)[self.site].reshape(-1, k))
+        column_sum = np.ones((k, rates.shape[1]))
+        pivot = np.empty_like(column_sum)
+        x = rhs.copy()
+        for i in range(k):
+            later = slice(i + 1, None)
+            pivot[i] = column_sum[i] + turnover[later, i].sum(axis=0)
+            share = turnover[later, i] / pivot[i]
+            column_sum[later] += turnover[i, later] * column_sum[i] / pivot[i]
+            x[later] += share[:, None] * x[i]
+            turnover[later, later] += share[:, None] * turnover[i, None, later]
+        for i in reversed(range(k)):
+            x[i] = (x[i] + np.einsum("sn,smn->mn", turnover[i, i + 1 :], x[i + 1 :])) / pivot[i]
+        return x
 
     def _two_sites(self, rates: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
         """Closed form for two kinds of sites: theta' (2, n) and d theta'/d q_r (reactions, 2, n).
@@ -129,12 +228,7 @@ class SurfaceKinetics:
         theta_0' = (theta_0 + c) / (1 + a + c) and its complement, with a and c the turnover of either kind; as written, each stays in
         [0, 1] in floating point too, because rounding is monotone.
         """
-        gain = np.zeros_like(theta)  # dt q of what turns the other kind into kind k
-        share = np.zeros((len(self.reactions), 2))
-        for r, s in enumerate(self.site):
-            other = 1 - s
-            share[r, other] = dt * self.nu_site[r, other]
-            gain[other] += share[r, other] * rates[r]
+        gain, share = self._gains(rates, theta, dt)
         whole = np.stack([(1.0 + gain[1]) + gain[0], (1.0 + gain[0]) + gain[1]])
         new = (theta + gain) / whole
         response = np.empty((len(self.reactions), *theta.shape))
@@ -166,3 +260,34 @@ class GasKinetics:
             slopes[r, a] += self.constant[r] * positive[b] * (concentration[a] > 0.0)
             slopes[r, b] += self.constant[r] * positive[a] * (concentration[b] > 0.0)
         return values, slopes
+
+
+def phi1(x: Floats) -> Floats:
+    """(1 - exp(-x)) / x for x >= 0."""
+    return _series(x, lambda v: -np.expm1(-v) / v, (1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0))
+
+
+def phi2(x: Floats) -> Floats:
+    """(1 - phi1(x)) / x for x >= 0."""
+    return _series(x, lambda v: (1.0 + np.expm1(-v) / v) / v, (1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0, 1.0 / 720.0))
+
+
+def dphi1(x: Floats) -> Floats:
+    """Derivative of phi1."""
+    return _series(x, lambda v: (np.exp(-v) + np.expm1(-v) / v) / v, (-1.0 / 2.0, 1.0 / 3.0, -1.0 / 8.0, 1.0 / 30.0, -1.0 / 144.0))
+
+
+def dphi2(x: Floats) -> Floats:
+    """Derivative of phi2."""
+    return _series(
+        x,
+        lambda v: -((np.exp(-v) + np.expm1(-v) / v) / v + (1.0 + np.expm1(-v) / v) / v) / v,
+        (-1.0 / 6.0, 1.0 / 12.0, -1.0 / 40.0, 1.0 / 180.0, -1.0 / 1008.0),
+    )
+
+
+def _series(x: Floats, closed: Callable[[Floats], Floats], coefficients: tuple[float, ...]) -> Floats:
+    """`closed` away from 0, its Taylor polynomial where cancellation would spoil it."""
+    small = x < 0.02
+    polynomial = np.polynomial.polynomial.polyval(x, coefficients)
+    return np.where(small, polynomial, closed(np.where(small, 1.0, x)))
