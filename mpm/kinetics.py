@@ -161,11 +161,10 @@ class SurfaceKinetics:
             mean_theta = unit[:, :, None] * one
         else:
             span = np.broadcast_to(np.asarray(time, dtype=float), theta.shape[1:])
-            matrix = unit - span[:, None, None] * np.einsum("rk,rn,rs->nks", self.nu_site, rates, self._consumed(k))
-            inverse = np.linalg.inv(matrix)
-            out = mean = np.einsum("nks,sn->kn", inverse, theta)
-            out_q = mean_q = span * np.einsum("nks,rs,rn->rkn", inverse, self.nu_site, out[self.site])
-            out_theta = mean_theta = np.moveaxis(inverse, 0, -1)
+            inverse = self._solve_sites(rates, span, np.broadcast_to(unit[:, :, None], (k, *theta.shape)))
+            out = mean = np.einsum("ksn,sn->kn", inverse, theta)
+            out_q = mean_q = span * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, out[self.site])
+            out_theta = mean_theta = inverse
         values = np.stack([self.constant[r] * concentration[g] * mean[s] for r, (g, s) in enumerate(self._pairs())])
         slopes = np.zeros((count, *concentration.shape))
         out_c = np.zeros((k, *concentration.shape))
@@ -200,8 +199,8 @@ class SurfaceKinetics:
             rates[r] = self.constant[r] * np.maximum(concentration[g], 0.0) / self.sites
         return rates
 
-    def _solve_sites(self, rates: Floats, dt: float, rhs: Floats) -> Floats:
-        """Solve (I - dt Q) x = rhs for any number of sites; rhs and x (sites, m, n), rhs >= 0.
+    def _solve_sites(self, rates: Floats, dt: Floats | float, rhs: Floats) -> Floats:
+        """Solve (I - dt Q) x = rhs for any number of sites; dt scalar or (n,), rhs and x (sites, m, n), rhs >= 0.
 
         Elimination without subtraction (Grassmann, Taksar and Heyman 1985): only the turnovers from site to site and the column sums
         enter, all positive, so sites are conserved to rounding however much faster than the step the reactions are.
