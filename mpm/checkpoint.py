@@ -51,7 +51,7 @@ def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
         "sites_initially": reactor.sites_initially,
     }
     if reactor.before is not None:
-        arrays["before_out"], arrays["before_volume"] = reactor.before.out, reactor.before.out_volume
+        arrays |= {f"before_{name}": np.asarray(getattr(reactor.before, name)) for name in BEFORE}
     meta = {
         "time": reactor.time,
         "steps": reactor.steps,
@@ -65,6 +65,7 @@ def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
 
 
 SUMMED = ("fed", "out", "back", "out_volume", "back_volume")
+BEFORE = ("out", "out_volume", "back_volume", "surface", "slid")  # of the latest output, for what is reported since then
 
 
 def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
@@ -95,9 +96,8 @@ def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
     reactor.flows.register(transport)
     if "before_out" in arrays:
         now = reactor.totals()
-        reactor.before = Totals(
-            **{**vars(now), "out": arrays["before_out"], "out_volume": arrays["before_volume"]}
-        )
+        then = {name: arrays[f"before_{name}"] for name in BEFORE}
+        reactor.before = Totals(**{**vars(now), **then, "slid": float(then["slid"])})
 
 
 def check_same_case(directory: RunDirectory, case: Case) -> None:

@@ -38,11 +38,12 @@ class Species:
 
 @dataclass(frozen=True)
 class Site:
-    """A state of the surface sites, or a solid film: atoms per site (or formula unit), molar mass [kg/mol] if known."""
+    """A state of the surface sites, or a solid film: atoms per site (or formula unit), molar mass [kg/mol] and density [kg/m3] if known."""
 
     name: str
     elements: Mapping[str, float]
     molar_mass: float | None = None
+    density: float | None = None
 
 
 @dataclass(frozen=True)

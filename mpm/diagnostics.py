@@ -27,8 +27,9 @@ FLOOR = 1e-6  # of the run's largest feed: balances of smaller amounts are measu
 class Totals:
     """Sums over all ranks since the start of a run [mol/m, m2], by species of the run (`names`).
 
-    `fed` (inlets, species), `out`, `back` (outlets, species), `out_volume` (outlets,), `stored`, `stored_initially` (species,) in the
-    gas; `surface` (reactions, reactive rows, columns) and `gas` (reactions, zones + 1) events, the last by zone number (0: none);
+    `fed` (inlets, species), `out`, `back` (outlets, species), `out_volume`, `back_volume` (outlets,), `stored`, `stored_initially`
+    (species,) in the gas; `surface` (reactions, reactive rows, columns) and `gas` (reactions, zones + 1) events, the last by zone number
+    (0: none); `reactive_rows` the grid's rows with reactive surface; `slid` the bed's way relative to the reactor [m];
     `sites`, `sites_initially` (site species,) on the solids in the strip, `sites_passed` those that left minus those that entered.
     """
 
@@ -37,10 +38,13 @@ class Totals:
     out: Floats
     back: Floats
     out_volume: Floats
+    back_volume: Floats
     stored: Floats
     stored_initially: Floats
     surface: Floats
     gas: Floats
+    reactive_rows: NDArray[np.int64]
+    slid: float
     sites: Floats
     sites_initially: Floats
     sites_passed: Floats
@@ -50,13 +54,15 @@ class Totals:
 class State:
     """Numbers of one instant: `theta` (sites, reactive rows, columns) and the CVD rate per zone and at its largest.
 
-    `cvd` is the integral of the rate over each zone's strip (zones + 1,) [mol/m/s], `cvd_max` the largest rate per total volume.
+    `cvd` is the integral of the rate over each zone's strip (zones + 1,) [mol/m/s], `cvd_max` the largest rate per total volume;
+    `concentration` the dosed species by name, (rows, columns) [mol/m3].
     """
 
     theta: Floats
     reactive_rows: NDArray[np.int64]
     cvd: Floats
     cvd_max: float
+    concentration: Mapping[str, Floats]
 
 
 def species_balances(case: Case, totals: Totals) -> dict[str, dict[str, float]]:
@@ -248,7 +254,7 @@ def outlet_fractions(case: Case, totals: Totals, before: Totals | None) -> dict[
         if volume <= 0.0:
             continue
         amounts = totals.out[k] - (before.out[k] if before else 0.0)
-        fractions = {name: 0.0 for name in case.mechanism.species_names}
+        fractions = dict.fromkeys(case.mechanism.species_names, 0.0)
         for name, amount in zip(totals.names, amounts, strict=True):
             fractions[name] = float(amount / (volume * molar_density))
         fractions[case.gas.carrier] = 1.0 - sum(fractions.values())
@@ -273,27 +279,6 @@ def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:
             zone.name: float(state.cvd[number] / whole) for number, zone in enumerate(case.geometry.zones, start=1)
         }
     return result
-
-
-def history_row(
-    case: Case, grid: Grid, time: float, totals: Totals, state: State, before: Totals | None
-) -> dict[str, float]:
-    """One row of history.csv, flat dotted names."""
-    balances = species_balances(case, totals)
-    tree: dict[str, Any] = {
-        "time": time,
-        "titration": {
-            name: {k: v for k, v in entry.items() if k != "exit_profile"} for name, entry in titration(case, grid, state).items()
-        },
-        "utilisation": utilisation(case, grid, totals),
-        "outlets": outlet_fractions(case, totals, before),
-        "cvd": cvd(case, grid, state),
-        "balance": {
-            **{name: entry["balance_error"] for name, entry in balances.items()},
-            "sites": site_balance(case, totals),
-        },
-    }
-    return flatten(tree)
 
 
 def flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, float]:

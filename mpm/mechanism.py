@@ -18,6 +18,7 @@ from pydantic_core import PydanticCustomError
 
 from mpm.chemistry import GasReaction, Mechanism, Site, Species, SurfaceReaction
 from mpm.units import (
+    Density,
     Dimension,
     Fraction,
     MolarEnergy,
@@ -63,11 +64,17 @@ class SpeciesTable(_Table):
 
 
 class SiteTable(_Table):
-    """`[site.NAME]` (a state of the surface sites) or `[film.NAME]` (a solid product)."""
+    """`[site.NAME]` (a state of the surface sites)."""
 
     molar_mass: MolarMass | None = None
     formula: str | None = None
     elements: dict[str, NonNegative] | None = None
+
+
+class FilmTable(SiteTable):
+    """`[film.NAME]` (a solid product); with `density` and `molar_mass` its thickness is reported."""
+
+    density: Density | None = None
 
 
 class ReactionTable(_Table):
@@ -90,7 +97,7 @@ class Chemistry(_Table):
     name: str = ""
     species: dict[str, SpeciesTable] = {}
     site: dict[str, SiteTable] = {}
-    film: dict[str, SiteTable] = {}
+    film: dict[str, FilmTable] = {}
     reaction: dict[str, ReactionTable] = {}
 
 
@@ -178,7 +185,7 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
         for name, table in chemistry.site.items()
     }
     films = {
-        name: Site(name, _elements("film", name, table), table.molar_mass)
+        name: Site(name, _elements("film", name, table), table.molar_mass, table.density)
         for name, table in chemistry.film.items()
     }
     seen: set[str] = set()

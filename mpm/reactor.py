@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from mpm import checkpoint, fem  # noqa: F401  (fem first: it loads the finite-element stack)
 from mpm.bed import Bed
-from mpm.diagnostics import State, Totals, history_row, total_concentration
+from mpm.diagnostics import State, Totals, total_concentration
 from mpm.errors import ConvergenceError, InputError, Interrupted
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
@@ -29,7 +29,7 @@ from mpm.progress import Progress
 from mpm.replay import March, Replay
 from mpm.schedule import Schedule, Step
 from mpm.strip import Strip
-from mpm.summary import summarise
+from mpm.summary import history_row, summarise
 from mpm.transport import Transport
 
 from mpi4py import MPI  # isort: skip  (after fem)
@@ -252,8 +252,9 @@ class Reactor:
         """What has passed so far, summed over all ranks; collective."""
         transport, bed, comm, grid = self.transport, self.bed, self.comm, self.grid
         ledger = transport.ledger
-        fed, out, back, volume = (total(comm, v) for v in (ledger.fed, ledger.out, ledger.back, ledger.out_volume))
-        surface = bed.scatter.to_all(ledger.surface_events) 
+        passed = (ledger.fed, ledger.out, ledger.back, ledger.out_volume, ledger.back_volume)
+        fed, out, back, volume, back_volume = (total(comm, v) for v in passed)
+        surface = bed.scatter.to_all(ledger.surface_events)
         zones = grid.zone_of_column[self.strip.column[: self.strip.owned]]
         count = len(self.case.geometry.zones) + 1
         gas = np.array([np.bincount(zones, e, count) for e in ledger.gas_events]).reshape(-1, count)
@@ -263,25 +264,33 @@ class Reactor:
             out=out,
             back=back,
             out_volume=volume,
+            back_volume=back_volume,
             stored=total(comm, transport.concentration @ transport.gas_volume),
             stored_initially=self.stored_initially,
             surface=surface.reshape(len(ledger.surface_events), len(bed.rows), grid.columns),
             gas=total(comm, gas),
+            reactive_rows=bed.rows,
+            slid=bed.distance,
             sites=total(comm, bed.content()),
             sites_initially=self.sites_initially,
             sites_passed=bed.passed.copy(),
         )
 
     def state(self) -> State:
-        """Coverage and gas reaction rates now; collective."""
+        """Coverage, dosed species and gas reaction rates now; collective."""
         rate = self._cvd_rate()
         zones = self.grid.zone_of_column[self.strip.column[: self.strip.owned]]
         per_zone = np.bincount(zones, rate * self.transport.volume, len(self.case.geometry.zones) + 1)
+        fed = {n for amounts in self.transport.feed.values() for n, c in amounts.items() if c > 0.0}
+        dosed = [i for i, n in enumerate(self.transport.names) if n in fed]
+        fields = self.strip.scatter.to_all(self.transport.concentration[dosed])
+        fields = fields.reshape(-1, self.grid.rows, self.grid.columns)
         return State(
             theta=self.bed.whole(),
             reactive_rows=self.bed.rows,
             cvd=total(self.comm, per_zone),
             cvd_max=float(largest(self.comm, [rate.max(initial=0.0)])[0]),
+            concentration={self.transport.names[i]: field for i, field in zip(dosed, fields, strict=True)},
         )
 
     def _cvd_rate(self) -> Floats:

@@ -1,4 +1,4 @@
-"""summary.json of a run: the numbers people quote, SI units, defined in `mpm.diagnostics`."""
+"""summary.json and the rows of history.csv: the numbers people quote, SI units, defined in `mpm.diagnostics` and `mpm.fronts`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import numpy as np
 
 from mpm.cycle import FlowField
 from mpm.diagnostics import (
+    State,
+    Totals,
     cvd,
     element_balances,
-    film_made,
+    flatten,
     nested,
+    outlet_fractions,
     site_balance,
     species_balances,
     titration,
@@ -19,10 +22,13 @@ from mpm.diagnostics import (
 )
 from mpm.engineering import inlet_excess
 from mpm.flow import boundary_flows, face_flow
+from mpm.fronts import backflow, contamination, cvd_totals, film, fronts
+from mpm.geometry import Grid
 from mpm.parallel import total
 from mpm.versions import versions
 
 if TYPE_CHECKING:
+    from mpm.case import Case
     from mpm.reactor import Reactor
 
 
@@ -49,12 +55,39 @@ def summarise(reactor: Reactor, status: str, wall: float) -> dict[str, Any]:
         "titration": titration(case, grid, state),
         "utilisation": utilisation(case, grid, totals),
         "outlets": nested(reactor.numbers, "outlets"),
-        "cvd": cvd(case, grid, state),
-        "film": film_made(case, totals),
+        "cvd": cvd(case, grid, state) | cvd_totals(case, totals),
+        "front": fronts(case, grid, state),
+        "contamination": contamination(case, grid, totals, state),
+        "film": nested(reactor.numbers, "film") or film(case, grid, totals, None),
     }
     if reactor.flows is not None:
         summary["flow"] = flow_numbers(reactor, reactor.flows.mean())
     return {key: value for key, value in summary.items() if value != {}}
+
+
+def history_row(
+    case: Case, grid: Grid, time: float, totals: Totals, state: State, before: Totals | None
+) -> dict[str, float]:
+    """One row of history.csv, flat dotted names; outlets and film tell what has passed since the row before."""
+    balances = species_balances(case, totals)
+    drawn = backflow(case, totals, before)
+    tree: dict[str, Any] = {
+        "time": time,
+        "titration": {
+            name: {k: v for k, v in entry.items() if k != "exit_profile"} for name, entry in titration(case, grid, state).items()
+        },
+        "utilisation": utilisation(case, grid, totals),
+        "outlets": {name: entry | drawn[name] for name, entry in outlet_fractions(case, totals, before).items()},
+        "cvd": cvd(case, grid, state) | cvd_totals(case, totals),
+        "front": fronts(case, grid, state),
+        "contamination": contamination(case, grid, totals, state),
+        "film": film(case, grid, totals, before),
+        "balance": {
+            **{name: entry["balance_error"] for name, entry in balances.items()},
+            "sites": site_balance(case, totals),
+        },
+    }
+    return flatten(tree)
 
 
 def flow_numbers(reactor: Reactor, mean: FlowField) -> dict[str, Any]:
