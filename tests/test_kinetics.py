@@ -128,6 +128,40 @@ def test_coverage_under_constant_gas_decays_exponentially(alumina: Mechanism) ->
         assert rate([1 / n for n in steps], errors) == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.parametrize("kind", ["alumina", "ring"])
+@pytest.mark.parametrize("time", [1e-6, 1e-3, 1.0])
+def test_conveyed_solids(alumina: Mechanism, kind: str, time: float) -> None:
+    """Fails when the coverage that leaves a cell and the mean rates in it do not balance, or any of their derivatives is wrong."""
+    mechanism, coupled = (alumina, ("TMA", "H2O")) if kind == "alumina" else (ring(), ("A", "B", "C"))
+    kinetics = surface(mechanism, coupled)
+    _, theta = random_state(len(coupled), len(mechanism.sites))
+    concentration = RNG.uniform(0.2, 1.0, (len(coupled), N)) * 1e-3
+    passed = kinetics.conveyed(concentration, theta, time)
+    turned = kinetics.nu_site.T @ passed.rates * time / SITES
+    np.testing.assert_allclose(passed.out - theta, turned, atol=1e-12 * max(1.0, np.abs(turned).max()))
+    assert passed.out.min() >= 0.0 and passed.out.max() <= 1.0 + 1e-14
+    for values, slopes, name in ((concentration, (passed.rates_c, passed.out_c), "c"), (theta, (passed.rates_theta, passed.out_theta), "theta")):
+        for j in range(len(values)):
+            h = 1e-6 * values[j].mean()
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = values.copy()
+                moved[j] += sign * h
+                ends.append(kinetics.conveyed(*((moved, theta) if name == "c" else (concentration, moved)), time))
+            for what, slope in zip(("rates", "out"), slopes, strict=True):
+                difference = (getattr(ends[0], what) - getattr(ends[1], what)) / (2 * h)
+                size = np.abs(getattr(passed, what)).max() / values[j].mean()
+                np.testing.assert_allclose(slope[:, j], difference, rtol=1e-4, atol=1e-6 * size, err_msg=f"{what} by {name} {j}")
+
+
+def test_conveyed_solids_are_exact_for_one_reaction(alumina: Mechanism) -> None:
+    """Fails when theta_out is not theta_in exp(-nu k C h/(v n_s)), the exact exposure to a constant concentration."""
+    kinetics = surface(alumina, ("H2O",))
+    theta, c, time = np.tile([[0.0], [1.0]], N), 2e-3, 1e-5
+    passed = kinetics.conveyed(np.full((1, N), c), theta, time)
+    k = float(kinetics.constant[0][0])
+    np.testing.assert_allclose(passed.out[1], np.exp(-2.0 * k * c * time / SITES), rtol=1e-13)
+
 def test_rate_constants_are_those_of_the_thesis(alumina: Mechanism) -> None:
     """Fails when A, the stoichiometry of (5-17), (5-18), (5-19) or the unit of the gas reaction is changed."""
     kinetics = surface(alumina, ("TMA", "H2O"))
