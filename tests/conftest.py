@@ -24,7 +24,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 import pytest
 
-GRACE_SECONDS = 60.0
+GRACE_SECONDS = float(os.environ.get("MPM_TEST_GRACE", "60"))
 """How long a rank that failed a test waits for the others before it aborts the job."""
 PATIENCE_SECONDS = 590.0
 """The same for a rank that passed: the others may still be computing (just under faulthandler_timeout)."""

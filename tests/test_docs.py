@@ -53,3 +53,13 @@ def test_readers_of_the_documentation(tmp_path: Path, monkeypatch: pytest.Monkey
     assert np.array_equal(with_pyvista["bed"]["theta_OAl(CH3)2"], bed)
     assert np.array_equal(with_mpm["bed"].ravel(), bed)
     assert np.array_equal(with_numpy["concentration"], (number * 80).astype(np.float32))
+
+
+@pytest.mark.parametrize(
+    "document", sorted(str(p.relative_to(ROOT)) for p in [ROOT / "README.md", *ROOT.glob("docs/*.md")])
+)
+def test_links_lead_somewhere(document: str) -> None:
+    """Fails when a document points to a file that does not exist."""
+    text = (ROOT / document).read_text(encoding="utf-8")
+    links = [link for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text) if "://" not in link]
+    assert [link for link in links if not (ROOT / document).parent.joinpath(link).exists()] == []
