@@ -12,6 +12,7 @@ import signal
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from pathlib import Path
@@ -25,7 +26,7 @@ from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.lease import Lease
 from mpm.sweep.pictures import draw
 from mpm.sweep.plan import plan
-from mpm.sweep.point import GRACE, Task, error_of, finished, mpirun, program, run_point
+from mpm.sweep.point import GRACE, Task, finished, mpirun, program, run_point
 from mpm.sweep.results import Results
 from mpm.sweep.sweepfile import read_sweep
 from mpm.sweep.table import write_csv
@@ -61,6 +62,8 @@ def run_sweep(
     for option, number in (("--jobs", jobs), ("--ranks", ranks)):
         if number is not None and number < 1:
             raise InputError.at(None, option, str(number), "a whole number of at least 1")
+    if jobs is not None and scheduler is not None:
+        say("-j does not apply with --scheduler: the workers' threads say how many points run at a time")
     jobs = jobs or max(1, len(os.sched_getaffinity(0)) // ranks)
     if ranks > 1 and not command:
         mpirun()
@@ -125,7 +128,7 @@ def changes(results: Results, earlier: dict[str, Any]) -> list[str]:
         sentences.append(
             f"{len(foreign)} earlier points in {runs} do not belong to this sweep any more; they are kept"
         )
-    done = {name: record for name, record in results.records.items() if results.status(name) == "done"}
+    done = {name: record for name, record in results.records.items() if results.states[name] == "done"}
     old = {name: record for name, record in done.items() if record.get("program") != program()}
     if old:
         versions = ", ".join(sorted({str(record.get("program")) for record in old.values()}))
@@ -210,7 +213,8 @@ class Collector:
 
     def run(self, tasks: Sequence[Task], lease: Lease) -> bool:
         """Until every task has ended; True when a signal put an earlier end to it."""
-        counts = self.results.settled({task.name for task in tasks})
+        ours = {task.name for task in tasks}
+        counts = Counter(state for name, state in self.results.states.items() if name not in ours)
         with Board(self.results.sweep.title, counts, len(tasks), self.pool.slots, self.live) as board:
             try:
                 for task in tasks:
@@ -250,8 +254,7 @@ class Collector:
         self.results.note(name, record)
         took = float(record.get("seconds", 0.0))
         self.seconds += took
-        status = self.results.status(name)
-        board.update(name, status, error_of(record, self.results.layout, name), took)
+        board.update(name, self.results.states[name], self.results.errors[name], took)
         if time.monotonic() - self._saved > SAVE_EVERY:
             write_csv(self.results.layout.root / "results.csv", self.results.columns(), self.results.rows())
             self._saved = time.monotonic()

@@ -7,12 +7,10 @@ rank. The compiled forms are shared by all points through the user's cache of do
 
 import contextlib
 import hashlib
-import json
 import os
 import re
 import shutil
 import signal
-import subprocess
 import sys
 import threading
 from collections.abc import Mapping
@@ -26,6 +24,7 @@ from mpm.errors import InputError
 from mpm.sweep import guard
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.lease import Watch
+from mpm.sweep.watchman import Watchman
 
 INHERITED = re.compile(
     r"(PMI_|PMI2_|PMIX_|HYDRA_|HYDI_|MPI_LOCAL|OMPI_|OPAL_|ORTE_|PRTE_|SLURM_|SLURMD_|"
@@ -44,7 +43,6 @@ STATUS = {0: "done", 2: "bad_input", 3: "failed", 130: "interrupted", guard.LOCK
 """By exit status; above 128: "killed"; anything else: "crashed"."""
 VERDICTS = ("done", "failed", "bad_input")
 """Final for one version of the program; every other point is run again by the next call."""
-GUARD_KILLED = 128 + signal.SIGKILL
 GRACE = 10.0
 """Seconds that a point gets to save its restart state when it is told to stop."""
 PATIENCE = 60.0
@@ -150,6 +148,10 @@ def error_of(record: Mapping[str, Any], layout: Layout, name: str) -> str:
     return last_line(layout.log(name)) or f"exit status {record['exit_status']} without a message"
 
 
+_slot = threading.local()
+"""Each thread that runs points keeps a guard."""
+
+
 def attempt(task: Task, number: int, resume: bool, watch: Watch) -> int:
     """Run the point once under its guard; returns the guard's exit status."""
     layout = Layout(Path(task.root))
@@ -171,7 +173,7 @@ def attempt(task: Task, number: int, resume: bool, watch: Watch) -> int:
     }
     watchman = getattr(_slot, "watchman", None)
     if watchman is None or not watchman.ready():
-        watchman = _slot.watchman = Watchman()
+        watchman = _slot.watchman = Watchman(clean_environment(os.environ))
     ended = threading.Event()
 
     def stop_when_abandoned() -> None:
@@ -185,48 +187,6 @@ def attempt(task: Task, number: int, resume: bool, watch: Watch) -> int:
     finally:
         ended.set()
         watcher.join()
-
-
-class Watchman:
-    """A guard process at our service (`mpm.sweep.guard`); each thread that runs points keeps one."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-I", "-S", guard.__file__],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=clean_environment(os.environ),
-            start_new_session=True,
-        )
-
-    def __del__(self) -> None:
-        self._process.communicate()  # the end of its orders is the guard's end
-
-    def ready(self) -> bool:
-        """Whether it lives."""
-        return self._process.poll() is None
-
-    def run(self, order: Mapping[str, Any]) -> int:
-        """Hand over an order and wait for the exit status; as of a killed point when the guard itself was killed."""
-        assert self._process.stdin is not None and self._process.stdout is not None
-        with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(order).encode() + b"\n")
-            self._process.stdin.flush()
-            answer = self._process.stdout.readline()
-            if answer:
-                return int(answer)
-        self._process.wait()
-        return GUARD_KILLED
-
-    def stop(self) -> None:
-        """Let the present point stop; from any thread."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError, ValueError):
-            os.write(self._process.stdin.fileno(), guard.STOP + b"\n")
-
-
-_slot = threading.local()
 
 
 def run_point(task: Task) -> dict[str, Any]:

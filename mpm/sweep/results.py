@@ -4,7 +4,7 @@ import contextlib
 import json
 import platform
 from collections import Counter
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
 
@@ -36,20 +36,23 @@ class Results:
         self.points = points
         self.layout = layout
         self.records: dict[str, dict[str, Any]] = {}
+        self.states: dict[str, str] = {}
+        """One word per point, see `mpm.sweep.point.status_of`; points that the case refused are bad_input."""
+        self.errors: dict[str, str] = {}
         self._numbers: dict[str, dict[str, float]] = {}
         for point in points:
             self.note(point.name, read_json(layout.record(point.name)))
+            if point.case is None:
+                self.states[point.name], self.errors[point.name] = "bad_input", point.error
 
     def note(self, name: str, record: dict[str, Any]) -> None:
         """Take over a point's verdict and, when it is done, its summary."""
+        run = self.layout.run(name)
         self.records[name] = record
-        self._numbers.pop(name, None)
-        if self.status(name) == "done":
-            self._numbers[name] = flatten(read_json(self.layout.run(name) / "summary.json"))
-
-    def status(self, name: str) -> str:
-        """One word; `bad_input` also for points that the case refused before they could run."""
-        return status_of(self.records[name], self.layout.run(name))
+        self.states[name] = status_of(record, run)
+        self.errors[name] = error_of(record, self.layout, name)
+        done = self.states[name] == "done"
+        self._numbers[name] = flatten(read_json(run / "summary.json")) if done else {}
 
     def columns(self) -> dict[str, str]:
         """Every column of the table with its SI unit ("" for words)."""
@@ -65,24 +68,15 @@ class Results:
         """A row per point of the plan, in its order."""
         rows = []
         for point in self.points:
+            name = point.name
             row: Row = dict(zip((axis.name for axis in self.sweep.axes), point.numbers, strict=True))
-            if point.case is None:
-                row |= {"status": "bad_input", "error": point.error, "point": point.name}
-            else:
-                error = error_of(self.records[point.name], self.layout, point.name)
-                row |= {"status": self.status(point.name), "error": error, "point": point.name}
-                row |= self._numbers.get(point.name, {})
-            rows.append(row)
+            row |= {"status": self.states[name], **self._numbers[name]}
+            rows.append(row | {"error": self.errors[name], "point": name})
         return rows
 
     def counts(self) -> Counter[str]:
         """How many rows have which status."""
-        return Counter(str(row["status"]) for row in self.rows())
-
-    def settled(self, to_run: Set[str]) -> Counter[str]:
-        """How many different points outside `to_run` have which status."""
-        states = {str(row["point"]): str(row["status"]) for row in self.rows()}
-        return Counter(state for name, state in states.items() if name not in to_run)
+        return Counter(self.states[point.name] for point in self.points)
 
     def missing_columns(self) -> list[str]:
         """Columns that the sweep file asks for by their full name and no finished point has."""
@@ -126,10 +120,10 @@ def provenance(results: Results) -> dict[str, Any]:
         {
             "point": point.name,
             "levels": point.levels,
-            "status": row["status"],
-            **results.records.get(point.name, {}),
+            "status": results.states[point.name],
+            **results.records[point.name],
         }
-        for point, row in zip(results.points, results.rows(), strict=True)
+        for point in results.points
     ]
     return {
         "title": sweep.title,

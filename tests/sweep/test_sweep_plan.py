@@ -1,6 +1,7 @@
 """Sweep files and their points: values, sampling, conditions, names, messages. Starts no process, needs no solver."""
 
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from mpm.case import load_case
 from mpm.errors import InputError
+from mpm.sweep.cluster import slurm_options
 from mpm.sweep.conditions import Condition
 from mpm.sweep.plan import plan
 from mpm.sweep.quantities import Range, to_number, unit_as_written
@@ -295,3 +297,14 @@ def test_planning_imports_neither_mpi_nor_the_solver(tmp_path):
 def test_shipped_sweeps_can_be_planned(file):
     """Fails when a shipped sweep does not fit the shipped cases, or one of its points is refused."""
     assert all(point.case is not None for point in plan(read_sweep(file)))
+
+
+def test_documented_sweep_is_valid(tmp_path):
+    """Fails when what docs/sweeps.md prints is refused, or its condition keeps other combinations than it says."""
+    text = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    sweep, slurm = re.findall(r"^```toml\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    (tmp_path / "sweep.toml").write_text(sweep + slurm, encoding="utf-8")
+    read = read_sweep(tmp_path / "sweep.toml")
+    kept = [point.numbers for point in plan(read)]
+    assert len(kept) == 8 and all(width <= 2 * height for width, height in kept)
+    assert slurm_options(read.slurm, 1, tmp_path)["job_cpu"] == 8
