@@ -30,7 +30,8 @@ from mpm.solvers import DirectSolver, check
 from mpm.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 
 if TYPE_CHECKING:
-    from mpm.case import Case
+    from mpm.case import Case, Inlet
+    from mpm.geometry import Grid
 
 Floats = NDArray[np.float64]
 CLOSED, OPEN = 1, 2  # facet markers: walls and inlets, outlets
@@ -386,6 +387,18 @@ def face_flow(strip: Strip, velocities: Floats) -> FaceFlow:
     return FaceFlow(velocities[sides, faces.behind], velocities[BOTTOM, bottom], velocities[TOP, top])
 
 
+def inlet_share(case: Case, grid: Grid, inlet: Inlet) -> Floats:
+    """Share of the flow through each column's wall facet that belongs to `inlet` (columns,); inlets may meet on a facet.
+
+    By the flows prescribed there; by covered lengths where none is (a port at rest in the lab's frame passes what the frame pumps).
+    """
+    there = [i for i in case.geometry.inlets if i.side == inlet.side]
+    length, lengths = grid.overlap(inlet), sum(grid.overlap(i) for i in there)
+    flow, flows = length * inlet.velocity, sum(grid.overlap(i) * i.velocity for i in there)
+    by_length = np.divide(length, lengths, out=np.zeros_like(length), where=lengths > 0.0)
+    return np.divide(flow, flows, out=by_length, where=flows > 0.0)
+
+
 def boundary_flows(case: Case, strip: Strip, flow: FaceFlow) -> dict[str, float]:
     """Volume flow through each port, positive into the strip [m2/s, that is m3/s per metre of depth]."""
     walls = {"bottom": flow.bottom, "top": -flow.top}
@@ -393,8 +406,7 @@ def boundary_flows(case: Case, strip: Strip, flow: FaceFlow) -> dict[str, float]
     flows = {}
     for inlet in case.geometry.inlets:
         columns = strip.column[strip.wall_cells(inlet.side)]
-        share = grid.overlap(inlet)[columns] > 0.0
-        flows[inlet.name] = float(np.sum(walls[inlet.side][share]) * grid.dx)
+        flows[inlet.name] = float(walls[inlet.side] @ inlet_share(case, grid, inlet)[columns] * grid.dx)
     for outlet in case.geometry.outlets:
         columns = strip.column[strip.wall_cells(outlet.side)]
         flows[outlet.name] = float(np.sum(walls[outlet.side][grid.opening(outlet)[columns]]) * grid.dx)

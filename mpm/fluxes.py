@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.flow import FaceFlow
+from mpm.flow import FaceFlow, inlet_share
 from mpm.parallel import any_rank
 from mpm.strip import Strip
 
@@ -31,20 +31,20 @@ def bernoulli(z: Floats) -> Floats:
     """B(z) = z / (exp z - 1), with its series near 0 and no overflow for any finite z."""
     z = np.asarray(z, dtype=float)
     small = np.abs(z) < 1e-3
-    safe = np.where(small, 1.0, np.minimum(z, 700.0))
-    return np.where(small, 1.0 - z / 2.0 + z * z / 12.0, safe / np.expm1(safe))
+    near, far = np.where(small, z, 0.0), np.where(small, 1.0, np.minimum(z, 700.0))
+    return np.where(small, 1.0 - near / 2.0 + near * near / 12.0, far / np.expm1(far))
 
 
 def exponential_flux(velocity: Floats, conductance: Floats) -> tuple[Floats, Floats]:
     """Coefficients (a, b) [m/s] of the flux a C_behind - b C_ahead for a face velocity [m/s] and conductance g [m/s].
 
-    g = 0 is legal and gives pure upwind; a - b = velocity always.
+    g = 0 is legal and gives pure upwind; a - b = velocity always, and neither is negative, not even by rounding.
     """
     velocity, conductance = np.broadcast_arrays(np.asarray(velocity, float), np.asarray(conductance, float))
     diffusing = conductance > 1e-12 * np.abs(velocity)
     g = np.where(diffusing, conductance, 1.0)
     b = np.where(diffusing, g * bernoulli(velocity / g), np.maximum(-velocity, 0.0))
-    return b + velocity, b
+    return np.maximum(b + velocity, 0.0), b
 
 
 def effective_diffusivity(case: Case, strip: Strip, diffusivity: float) -> tuple[Floats, Floats]:
@@ -131,9 +131,7 @@ class FluxAssembler:
         cells, columns, inward = self._wall(inlet.side, flow)
         grid = self.strip.grid
         overlap = grid.overlap(inlet)[columns]
-        # several ports may share a facet: each carries its part of the prescribed flow
-        shared = sum(grid.overlap(i)[columns] * i.velocity for i in self.case.geometry.inlets if i.side == inlet.side)
-        part = np.divide(overlap * inlet.velocity, shared, out=np.zeros_like(overlap), where=np.abs(shared) > 0.0)
+        part = inlet_share(self.case, grid, inlet)[columns]
         mine = np.flatnonzero(overlap > 0.0)
         cells, area = cells[mine], overlap[mine]
         volume_in = inward[mine] * grid.dx * part[mine]
