@@ -62,17 +62,26 @@ ROWS: dict[str, Row] = {
         "GL56 (one size), Gamma 0.30, air, angle from the horizontal", "1.3",
         sixteen("GL56", 0.30, FINE, angle_from="horizontal"),
     ),
+    "sine_105_full": (
+        "GL50, sine 1.05 g, cohesion not reduced", "1.08-3.51",
+        glass({"kind": "seed", "harmonics": 1}, {**SMALL, "reduced_cohesion": False}),
+    ),
+    "sine_070_full": (
+        "GL50, sine 0.7 g, cohesion not reduced", "0.33",
+        glass({"kind": "seed", "harmonics": 1, "gamma": 0.7}, {**SMALL, "reduced_cohesion": False}),
+    ),
     "sine_105_large": ("GL50, sine 1.05 g, box 20x5x15 d", "1.08-3.51", glass({"kind": "seed", "harmonics": 1}, LARGE)),
     "sawtooth_105_large": ("GL50, pseudo-sawtooth, box 20x5x15 d", "1.57", glass(SAWTOOTH, LARGE)),
 }  # fmt: skip
 
 
-def measure(name: str, stiffness: float, seed: int, out: Path) -> None:
+def measure(name: str, stiffness: float, seed: int, cycles: int, out: Path) -> None:
     """Run one seed of one row unless its result is there."""
     result = out / f"{name}_k{stiffness:g}_s{seed}.json"
     if result.exists():
         return
-    case = load_case(ROWS[name][2], {"box.stiffness": f"{stiffness!r} N/m", "run.dump_per_cycle": 0})
+    change = {"box.stiffness": f"{stiffness!r} N/m", "run.dump_per_cycle": 0, "run.cycles": cycles}
+    case = load_case(ROWS[name][2], change)
     simulation = Simulation(case, seed, out / "states" / result.stem)
     began = time.process_time()
     arrays = simulation.run(resume=True)
@@ -123,6 +132,7 @@ def main() -> None:
     parser.add_argument("--rows", nargs="*", choices=list(ROWS), default=list(ROWS))
     parser.add_argument("--stiffness", nargs="*", type=float, default=[3.0, 30.0, 300.0])
     parser.add_argument("--seeds", nargs="*", type=int, default=[1, 2, 3])
+    parser.add_argument("--cycles", type=int, default=8, help="per run, the first three are not averaged")
     parser.add_argument("--markdown", action="store_true", help="print the table of what is there")
     options = parser.parse_args()
     if options.markdown:
@@ -133,7 +143,7 @@ def main() -> None:
         for seed in options.seeds:
             for name in options.rows:
                 try:
-                    measure(name, stiffness, seed, options.output)
+                    measure(name, stiffness, seed, options.cycles, options.output)
                 except ConvergenceError as error:
                     print(f"{name}, {stiffness:g} N/m, seed {seed}: {error}", flush=True)
 

