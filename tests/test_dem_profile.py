@@ -85,6 +85,19 @@ def test_acceleration_criterion():
     assert phase == pytest.approx(100.0, abs=9.0)
     assert delay == pytest.approx(phase / 360.0 / 16.0, abs=1e-9)
     assert analysis.acceleration_liftoff(Profile(PHASE, BASE, np.ones(N)), BASE, 1 / 16) is None
+    assert (
+        analysis.acceleration_liftoff(
+            Profile(PHASE, 0.3 * np.roll(BASE, 20, axis=1), np.ones(N)), BASE, 1 / 16
+        )
+        is None
+    )
+
+
+def test_phases_begin_at_zero():
+    """Samples at interval ends numbered by their time: row and column must recover cycle and phase."""
+    time = np.arange(1, 25)  # three cycles of eight samples, the first at 1/8 of a cycle
+    assert (analysis.over_phase(time, 8, 1) == np.array([np.arange(8, 16), np.arange(16, 24)])).all()
+    assert (analysis.over_phase(time, 8, 0)[0] == np.array([8, 1, 2, 3, 4, 5, 6, 7])).all()
 
 
 def test_self_diffusivity_of_a_random_walk():

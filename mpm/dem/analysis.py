@@ -53,9 +53,16 @@ def cycle_velocities(arrays: Arrays, mass: np.ndarray, waveform: Waveform, disca
 
 
 def over_phase(values: np.ndarray, samples: int, discard: int) -> np.ndarray:
-    """Samples (cycles * samples, ...) as (kept cycles, samples, ...), rolled so that phase 0 comes first."""
-    by_cycle = values.reshape(-1, samples, *values.shape[1:])[discard:]
-    return np.roll(by_cycle, 1, axis=1)  # the last sample of a cycle is phase 360 = 0
+    """Samples (cycles * samples, ...) as (kept cycles, samples, ...) from phase 0 on.
+
+    Samples are taken at the ends of equal intervals, so phase 0 of a cycle is the last sample of the one before;
+    when no cycle is discarded, the last sample of a cycle stands for its beginning.
+    """
+    kept = len(values) // samples - discard
+    if discard > 0:
+        first = discard * samples - 1
+        return values[first : first + kept * samples].reshape(kept, samples, *values.shape[1:])
+    return np.roll(values.reshape(kept, samples, *values.shape[1:]), 1, axis=1)
 
 
 def gap_over_phase(arrays: Arrays, samples: int, discard: int) -> np.ndarray:
@@ -89,14 +96,15 @@ def flight_interval(phase: np.ndarray, gap: np.ndarray, limit: float) -> tuple[f
 
 def acceleration_liftoff(curve: Profile, base: np.ndarray, period: float) -> tuple[float, float] | None:
     """The seed's criterion: (phase [deg], delay after mid-extension [s]) at which |d(u_bed - u_base)/dt| first
-    exceeds 1 m/s2 in two successive samples, counted from the largest base velocity; None if it never does."""
+    exceeds 1 m/s2 in two successive samples, counted from the largest base velocity. None if it never does, or
+    if the bed does not follow the base even at mid-extension: a slipping bed has no lift-off to be found so."""
     relative = curve.velocity[0] - base[0]
     n = len(relative)
     rate = (np.roll(relative, -1) - np.roll(relative, 1)) / (2.0 * period / n)
     start = int(np.argmax(base[0]))
     deviates = np.abs(np.roll(rate, -start)) > ACCELERATION_DEVIATION
     first = np.flatnonzero(deviates & np.roll(deviates, -1))
-    if len(first) == 0:
+    if len(first) == 0 or first[0] == 0:
         return None
     k = int(first[0])
     return float(curve.phase[(start + k) % n]), k * period / n
