@@ -97,14 +97,14 @@ def flight_interval(phase: np.ndarray, gap: np.ndarray, limit: float) -> tuple[f
 def acceleration_liftoff(curve: Profile, base: np.ndarray, period: float) -> tuple[float, float] | None:
     """The seed's criterion: (phase [deg], delay after mid-extension [s]) at which |d(u_bed - u_base)/dt| first
     exceeds 1 m/s2 in two successive samples, counted from the largest base velocity. None if it never does, or
-    if the bed does not follow the base even at mid-extension: a slipping bed has no lift-off to be found so."""
+    if the bed lags the base by over a fifth at mid-extension: a slipping bed has no lift-off to be found so."""
     relative = curve.velocity[0] - base[0]
     n = len(relative)
     rate = (np.roll(relative, -1) - np.roll(relative, 1)) / (2.0 * period / n)
     start = int(np.argmax(base[0]))
     deviates = np.abs(np.roll(rate, -start)) > ACCELERATION_DEVIATION
     first = np.flatnonzero(deviates & np.roll(deviates, -1))
-    if len(first) == 0 or first[0] == 0:
+    if len(first) == 0 or abs(relative[start]) > 0.2 * base[0, start]:
         return None
     k = int(first[0])
     return float(curve.phase[(start + k) % n]), k * period / n
