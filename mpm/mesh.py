@@ -211,7 +211,7 @@ def _check(grid: Grid, corners: NDArray[np.float64], count: int, layer: NDArray[
         np.abs(y[:, :, [0, 1]] - grid.y[:-1, None, None]).max(),
         np.abs(y[:, :, [2, 3]] - grid.y[1:, None, None]).max(),
     )
-    if off > 1e-6 * min(grid.dx, grid.dy.min()):
+    if off > 1e-4 * min(grid.dx, grid.dy.min()):  # gmsh places graded nodes to about 1e-8 of the layer
         raise InputError(f"the mesh is not the case's grid: a node lies {off:.3g} m off")
     if np.any(layer.reshape(grid.rows, grid.columns) != grid.row_layer[:, None]):
         raise InputError("the mesh's layers are not those of the case")
