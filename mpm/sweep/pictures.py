@@ -89,6 +89,8 @@ def edges(levels: np.ndarray, logarithmic: bool) -> np.ndarray:
 
 def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: str) -> None:
     """One number over two axes, with contour lines where there are enough neighbours."""
+    from matplotlib.patheffects import withStroke
+
     columns, rows = np.unique(x.positions), np.unique(y.positions)
     field = np.full((len(rows), len(columns)), np.nan)
     field[np.searchsorted(rows, y.positions), np.searchsorted(columns, x.positions)] = values
@@ -102,7 +104,10 @@ def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: st
     figure.colorbar(mesh, ax=axes, label=label)
     if not (x.words or y.words) and np.ptp(field.compressed()) > 0:
         lines = axes.contour(columns, rows, field, colors="white", linewidths=0.8)
-        axes.clabel(lines, fontsize="small")
+        outline = [withStroke(linewidth=2, foreground="0.2")]  # legible on the light end of the map, too
+        lines.set_path_effects(outline)
+        for text in axes.clabel(lines, fontsize="small"):
+            text.set_path_effects(outline)
     axes.set(xlim=across[[0, -1]], ylim=up[[0, -1]])
 
 
