@@ -144,10 +144,12 @@ class Transport:
             np.zeros((len(self.gas.reactions), own)),
         )
         self.largest_feed = max((c for f in self.feed.values() for c in f.values()), default=0.0)
-        self.feed_rate = max(
-            (abs(i.velocity) * i.width * max(self.feed[i.name].values(), default=0.0) for i in case.geometry.inlets), default=0.0
-        )
         diffusivities = [case.gas.diffusivity[name] for name in self.names]
+        exchange = max(diffusivities, default=0.0) / float(strip.grid.y[-1] - strip.grid.y[0])  # of an inlet that only diffuses
+        self.feed_rate = max(
+            ((i.velocity + exchange) * i.width * max(self.feed[i.name].values(), default=0.0) for i in case.geometry.inlets),
+            default=0.0,
+        )
         self._distinct = sorted(set(diffusivities))
         self._group = [self._distinct.index(d) for d in diffusivities]
         self._assemblers = [FluxAssembler(case, strip, d, dispersion) for d in self._distinct]
@@ -164,9 +166,9 @@ class Transport:
         """Signed gas stoichiometry of the running reactions, (reactions, species of the run)."""
         self.nu_surface = np.array(
             [[r.nu_gas.get(n, 0.0) for n in self.names] for r in self.surface.reactions]
-        ).reshape(-1, len(self.names))
+        ).reshape(len(self.surface.reactions), len(self.names))
         self.nu_gas = np.array([[r.nu.get(n, 0.0) for n in self.names] for r in self.gas.reactions]).reshape(
-            -1, len(self.names)
+            len(self.gas.reactions), len(self.names)
         )
 
     def add_flow(self, flow: FaceFlow) -> int:
@@ -192,6 +194,7 @@ class Transport:
         try:
             self._advance(number, t0, t1)
         except ConvergenceError as error:
+            self.concentration, self.bed.theta = concentration, theta
             if halvings == HALVINGS:
                 raise ConvergenceError(f"t = {t0:.6g} s, step of {t1 - t0:.3g} s: {error}") from error
             ledger = copy.deepcopy(self.ledger)
