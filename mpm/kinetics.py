@@ -94,7 +94,9 @@ class SurfaceKinetics:
         t = np.broadcast_to(np.asarray(temperature, dtype=float), surface.shape)
         self.constant = [np.asarray(r.rate_constant(t, molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions]
         self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(-1, len(names))
-        self.nu_gas = np.array([[r.nu_gas.get(k, 0.0) for k in coupled] for r in self.reactions]).reshape(-1, len(coupled))
+        self.nu_gas = np.array([[r.nu_gas.get(k, 0.0) for k in coupled] for r in self.reactions]).reshape(
+            len(self.reactions), len(coupled)
+        )
 
     def part(self, chosen: NDArray[np.integer]) -> SurfaceKinetics:
         """The same reactions in some of the cells."""
