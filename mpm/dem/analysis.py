@@ -96,17 +96,28 @@ def flight_interval(phase: np.ndarray, gap: np.ndarray, limit: float) -> tuple[f
 
 def acceleration_liftoff(curve: Profile, base: np.ndarray, period: float) -> tuple[float, float] | None:
     """The seed's criterion: (phase [deg], delay after mid-extension [s]) at which |d(u_bed - u_base)/dt| first
-    exceeds 1 m/s2 in two successive samples, counted from the largest base velocity. None if it never does, or
-    if the bed lags the base by over a fifth at mid-extension: a slipping bed has no lift-off to be found so."""
+    exceeds 1 m/s2 in two successive samples, after the largest base velocity.
+
+    The search begins where the bed follows the base (velocity within a tenth of the largest, acceleration within
+    the criterion, over three samples): a bed may land only after mid-extension. None when it never follows it in
+    the half cycle after mid-extension, as a slipping bed, or never deviates.
+    """
     relative = curve.velocity[0] - base[0]
     n = len(relative)
-    rate = (np.roll(relative, -1) - np.roll(relative, 1)) / (2.0 * period / n)
     start = int(np.argmax(base[0]))
-    deviates = np.abs(np.roll(rate, -start)) > ACCELERATION_DEVIATION
-    first = np.flatnonzero(deviates & np.roll(deviates, -1))
-    if len(first) == 0 or abs(relative[start]) > 0.2 * base[0, start]:
+    rate = np.roll(np.roll(relative, -1) - np.roll(relative, 1), -start) / (2.0 * period / n)
+    calm = np.abs(rate) <= ACCELERATION_DEVIATION
+    follows = calm & (np.abs(np.roll(relative, -start)) < 0.1 * base[0, start])
+    together = np.flatnonzero(
+        follows[: n // 2] & np.roll(follows, -1)[: n // 2] & np.roll(follows, -2)[: n // 2]
+    )
+    if len(together) == 0:
         return None
-    k = int(first[0])
+    deviates = np.flatnonzero(~calm & ~np.roll(calm, -1))
+    deviates = deviates[deviates > together[0]]
+    if len(deviates) == 0:
+        return None
+    k = int(deviates[0])
     return float(curve.phase[(start + k) % n]), k * period / n
 
 
