@@ -138,7 +138,7 @@ def site_balance(case: Case, totals: Totals) -> float:
 def element_balances(case: Case, totals: Totals) -> dict[str, float]:
     """Per element: what came in with gas and solids = what left with them + what is stored in the gas, on surfaces and in the film.
 
-    The carrier takes no part. Relative to the atoms fed (or, when none are, to those on the solids).
+    The carrier takes no part. Relative to the largest of these terms, or to 1e-6 of the atoms on the solids when all are smaller.
     """
     mechanism = case.mechanism
     errors = {}
@@ -160,7 +160,8 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
             ]
         atoms_of_film = {film.name: film.elements.get(element, 0.0) for film in mechanism.films}
         terms += [-atoms_of_film[name] * amount for name, amount in film_made(case, totals).items()]
-        scale = max((abs(t) for t in terms), default=0.0)
+        on_solids = sum(s.elements.get(element, 0.0) * n for s, n in zip(mechanism.sites, totals.sites_initially, strict=True))
+        scale = max(FLOOR * float(on_solids), *(abs(t) for t in terms))
         errors[element] = abs(sum(terms)) / scale if scale else 0.0
     return errors
 
