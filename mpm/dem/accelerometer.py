@@ -11,6 +11,10 @@ from mpm.errors import InputError
 from .relations import GRAVITY
 from .waveform import Harmonic, HarmonicWaveform
 
+NOISE = (
+    0.02  # of the largest amplitude of a channel: smaller peaks are noise, which integration would magnify
+)
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -125,11 +129,11 @@ def fit_channel(t: np.ndarray, signal: np.ndarray, count: int) -> Fit:
     solution, residual = project(frequencies)
     a, b = np.split(solution, 2)  # a cos + b sin = A cos(w t - phi), A = |a + ib|, phi = arg(a + ib)
     amplitudes, phases = np.hypot(a, b), np.arctan2(b, a)
-    harmonics = tuple(
-        Harmonic(float(A), float(f), float(p))
-        for A, f, p in zip(amplitudes, frequencies, phases, strict=True)
-    )
-    correction = tuple(float(A / raw) for A, (_, raw) in zip(amplitudes, peaks, strict=True))
+    kept = amplitudes >= NOISE * amplitudes.max()
+    terms = zip(amplitudes[kept], frequencies[kept], phases[kept], strict=True)
+    harmonics = tuple(Harmonic(float(A), float(f), float(p)) for A, f, p in terms)
+    raw = np.array([amplitude for _, amplitude in peaks])[kept]
+    correction = tuple((amplitudes[kept] / raw).tolist())
     return Fit(harmonics, correction, float(1.0 - residual.var() / signal.var()))
 
 

@@ -13,7 +13,7 @@ from mpm.errors import InputError
 
 from .accelerometer import fit_record, read_record, resample, spectrum
 from .case import load_case
-from .waveform import extension_velocity, peak_displacement
+from .waveform import HarmonicWaveform, extension_velocity, peak_displacement
 
 
 class RunByDefault(TyperGroup):
@@ -159,8 +159,9 @@ def waveform(
         directory / "waveform.json", json.dumps(finite(report), indent=2, allow_nan=False) + "\n"
     )
     write_atomically(directory / "waveform.toml", "\n".join(toml) + "\n")
+    unshifted = HarmonicWaveform(along.harmonics, vertical.harmonics, fitted.frequency)
     spectra = [spectrum(*resample(record.t, row)) for row in record.acceleration]
-    draw_waveform(directory / "waveform.png", (record.t, record.acceleration), fitted, spectra)
+    draw_waveform(directory / "waveform.png", (record.t, record.acceleration), unshifted, spectra)
     typer.echo(f"fundamental {fitted.frequency:.3f} Hz")
     for name, (terms, fit) in rows.items():
         typer.echo(f"{name}: {100 * fit.explained:.1f} % of the variance")

@@ -15,7 +15,7 @@ from .analysis import Results
 from .box import BoxSpec, Particles
 from .case import DemCase
 from .profile import scaled_to_mean
-from .waveform import Waveform
+from .waveform import HarmonicWaveform, Waveform
 
 BASE, BED, FIT = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito: stay apart for colour-blind readers
 
@@ -232,28 +232,32 @@ def _bed(spec: BoxSpec, particles: Particles) -> Figure:
 def draw_waveform(
     path: Path,
     record: tuple[np.ndarray, np.ndarray],
-    waveform: Waveform,
+    fit: HarmonicWaveform,
     spectra: list[tuple[np.ndarray, np.ndarray]],
 ) -> None:
-    """Accelerometer data with the fitted harmonics, their spectra, and the displacement they integrate to."""
+    """Four cycles of accelerometer data with the fitted harmonics, the spectra, and the displacements.
+
+    `fit` has the clock of the record.
+    """
     t, acceleration = record
-    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    span = 4.0 / fit.frequency
+    smooth = np.linspace(0.0, span, 800)
+    figure = Figure(figsize=(9.0, 5.5), layout="constrained")
     axes = figure.subplots(2, 3)
-    show = t < 4.0 / waveform.frequency
-    smooth = np.linspace(0.0, 4.0 / waveform.frequency, 800)
     for row, name in enumerate(("along", "vertical")):
-        axes[row, 0].plot(1e3 * t[show], acceleration[row, show], ".", ms=2, color=BASE, label="data")
-        axes[row, 0].set(xlabel="t [ms]", ylabel=f"{name} [m/s²]")
+        data, lines, moved = axes[row]
+        data.plot(1e3 * t[t < span], acceleration[row, t < span], ".", ms=3, color=BASE, label="data")
+        data.plot(1e3 * smooth, fit.acceleration(smooth)[row], color=BED, lw=1.0, label="fit")
+        data.set(xlabel="t [ms]", ylabel=f"acceleration {name} [m/s²]")
         frequency, amplitude = spectra[row]
-        axes[row, 1].plot(frequency, amplitude, color=BASE, lw=0.8)
-        axes[row, 1].set(
-            xlabel="frequency [Hz]", ylabel="amplitude [m/s²]", xlim=(0, min(frequency[-1], 500))
+        lines.plot(frequency, amplitude, color=BASE, lw=0.8, label="FFT")
+        terms = (fit.horizontal, fit.vertical)[row]
+        lines.plot(
+            [h.frequency for h in terms], [h.amplitude for h in terms], "o", color=BED, ms=4, label="fit"
         )
-        axes[row, 2].plot(
-            1e3 * smooth, waveform.acceleration(smooth)[row], color=BED, label="fit, phase 0 first"
-        )
-        other = axes[row, 2].twinx()
-        other.plot(1e3 * smooth, 1e6 * waveform.displacement(smooth)[row], color=FIT)
-        other.set_ylabel("displacement [µm]", color=FIT)
-        axes[row, 2].set(xlabel="t [ms]", ylabel="fitted [m/s²]")
+        lines.set(xlabel="frequency [Hz]", ylabel="amplitude [m/s²]", xlim=(0, min(frequency[-1], 500)))
+        moved.plot(1e3 * smooth, 1e6 * fit.displacement(smooth)[row], color=FIT)
+        moved.set(xlabel="t [ms]", ylabel=f"displacement {name} [µm]")
+    for axis in axes[0, :2]:
+        axis.legend(frameon=False)
     figure.savefig(path, dpi=150)
