@@ -23,8 +23,22 @@ from mpm.files import write_atomically
 
 SMALL = {"length": 8.0, "depth": 4.0, "height": 15.0, "size_classes": 1}
 LARGE = {"length": 20.0, "depth": 5.0, "height": 15.0, "size_classes": 1}
-COARSE = {"length": 8.0, "depth": 4.0, "height": 15.0, "size_classes": 5, "base": "frit", "frit_diameter": "125 um"}
-FINE = {"length": 8.0, "depth": 4.0, "height": 15.0, "size_classes": 1, "base": "frit", "frit_diameter": "25 um"}
+COARSE = {
+    "length": 8.0,
+    "depth": 4.0,
+    "height": 15.0,
+    "size_classes": 5,
+    "base": "frit",
+    "frit_diameter": "125 um",
+}
+FINE = {
+    "length": 8.0,
+    "depth": 4.0,
+    "height": 15.0,
+    "size_classes": 1,
+    "base": "frit",
+    "frit_diameter": "25 um",
+}
 SIXTEEN = {"kind": "sine", "frequency": "16 Hz", "angle": "60 deg", "angle_from": "vertical"}
 SAWTOOTH = {"kind": "sawtooth", "gamma": 10.273 / 9.81, "frequency": "48 Hz", "angle": "45 deg"}
 AIR = {"velocity": "0 cm/s"}
@@ -127,7 +141,9 @@ def markdown(out: Path) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, default=Path("results/dem_table"))
     parser.add_argument("--rows", nargs="*", choices=list(ROWS), default=list(ROWS))
     parser.add_argument("--stiffness", nargs="*", type=float, default=[3.0, 30.0, 300.0])

@@ -168,6 +168,20 @@ def test_cohesion_force_follows_the_formula(tmp_path, kind):
         assert pull == pytest.approx(exact, abs=5e-3 * cohesion.largest_force(hamaker, radius, p.asperity))
 
 
+def test_cohesion_between_very_different_sizes(tmp_path):
+    """A sixth of the diameter next to the whole: both tables are usable and hold the formula in contact."""
+    p, small, k = POWDERS["GL50"], D / 6, 30.0
+    position = [[3 * D, 5 * D, 5 * D], [3 * D + (D + small) / 2, 5 * D, 5 * D]]
+    with make(tmp_path, position, stiffness=k, steps=14.0, cohesion=True, diameters=(D, small)) as box:
+        state = box.snapshot()
+        box.run(0)
+        force = box._local("f")[np.argsort(box._local("id"))][:, 0]
+    assert state.classes.tolist() == [0, 1]
+    hamaker = cohesion.reduced_hamaker(p.hamaker, k, p.stiffness)
+    radius = D * small / (D + small) / 2
+    assert force[0] == pytest.approx(cohesion.largest_force(hamaker, radius, p.asperity), rel=5e-3)
+
+
 def test_energy_is_never_gained(tmp_path):
     """Forty spinning particles in a closed box without body force: kinetic energy at rest of contacts only falls.
 

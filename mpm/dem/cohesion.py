@@ -1,5 +1,6 @@
 """Van der Waals cohesion after Rumpf (2-6, 3-8), as a function and as the tables LAMMPS interpolates."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -55,15 +56,22 @@ def table_text(
 
     `contact` is that distance at contact [m]. Pair tables are equidistant in r^2: style and file agree in
     `points` and the upper end is the cutoff to the last bit, so LAMMPS takes the values as they are instead of a
-    spline that overshoots at the kink. Wall tables are equidistant in r. The energy is the integral of the
-    force from the outer end.
+    spline that overshoots at the kink. Wall tables are equidistant in r, at half the spacing. One point lies on
+    the kink at 0.3 nm. The energy is the integral of the force from the outer end.
     """
-    low, high = contact * (1.0 - TABLE_OVERLAP), contact + OUTER_CUTOFF
+    high, kink = contact + OUTER_CUTOFF, contact + INNER_CUTOFF
+    index = np.arange(points)
     if wall:
         high += 2e-9  # here LAMMPS wants the table to reach beyond the cutoff
-        r = np.linspace(low, high, points)
+        step = (high - kink) / round((high - kink) / (0.5 * TABLE_SPACING))
+        r = kink + step * (index - (points - 1)) + (high - kink)
     else:
-        r = np.sqrt(np.linspace(low**2, high**2, points))
+        span = high**2 - kink**2
+        # a small pair among large ones shares their number of points: finer, rather than down to r = 0
+        finer = math.ceil(span * (points - 1) / (high**2 - (0.5 * contact) ** 2))
+        step = span / max(round((high - kink) / TABLE_SPACING), finer)
+        r = np.sqrt(high**2 + step * (index - (points - 1)))
+    low = float(r[0])
     attraction = rumpf_force(r - contact, hamaker, radius, asperity)
     steps = 0.5 * (attraction[1:] + attraction[:-1]) * np.diff(r)
     energy = -np.append(np.cumsum(steps[::-1])[::-1], 0.0)
