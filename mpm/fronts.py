@@ -79,9 +79,8 @@ def front(grid: Grid, profile: Floats, feed: float, center: float) -> dict[str, 
 def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
     """Per dosing inlet and layer: the fronts of its precursor's height-averaged concentration (see `front`).
 
-    In layers with reactive surface also `coverage`: the distance [m] upstream of the inlet's centreline at which the height-averaged
-    coverage of the site species that its half-reaction makes falls to 1/2. `height`: the y [m] at which the precursor in the column
-    of the centreline, seen from the inlet, falls to half its feed.
+    In layers with reactive surface also `coverage` [m], see `coverage_front`, of the site species that its half-reaction makes.
+    `height`: the y [m] at which the precursor in the column of the centreline, seen from the inlet, falls to half its feed.
     """
     result: dict[str, dict[str, Any]] = {}
     for inlet in case.geometry.inlets:
@@ -96,9 +95,11 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
         for layer in case.geometry.layers:
             numbers = front(grid, layer_mean(grid, field, layer.name), feed, inlet.center)
             coverage = None if made is None else _layer_coverage(grid, state, made, layer.name)
-            if coverage is not None:
-                distance, columns = walk(grid, inlet.center, -1)
-                at = crossing(distance, coverage[columns], 0.5)
+            if coverage is not None and reaction is not None:
+                incoming = None
+                if layer.moving and case.geometry.bed_inflow == "fresh" and layer.material is not None:
+                    incoming = layer.material.initial_coverage.get(reaction.product_site, 0.0)
+                at = coverage_front(grid, coverage, inlet.center, incoming)
                 if at is not None:
                     numbers["coverage"] = at
             if numbers:
@@ -109,6 +110,30 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
         if entry:
             result[inlet.name] = entry
     return result
+
+
+def coverage_front(grid: Grid, profile: Floats, center: float, incoming: float | None = None) -> float | None:
+    """Distance [m] upstream of an inlet's centreline at which a height-averaged coverage (columns,) passes 1/2.
+
+    Negative when the coverage at the centreline is below 1/2 already: the front then lies that far downstream. `incoming` is the
+    coverage with which solids enter at the left end; they do not come round from the right then. None where there is no front.
+    """
+    upstream = _half(grid, profile, center, -1, incoming)
+    if upstream is not None:
+        return upstream
+    downstream = _half(grid, 1.0 - profile, center, 1, None if incoming is None else 1.0)
+    return None if downstream is None else -downstream
+
+
+def _half(grid: Grid, profile: Floats, center: float, direction: int, edge: float | None) -> float | None:
+    """Distance from `center` at which `profile` falls to 1/2; with `edge`, its value at that end of the strip, the walk stops there."""
+    distance, columns = walk(grid, center, direction)
+    values = profile[columns]
+    if edge is not None:
+        end = center - grid.x[0] if direction < 0 else grid.x[-1] - center
+        inside = distance < end
+        distance, values = np.append(distance[inside], end), np.append(values[inside], edge)
+    return crossing(distance, values, 0.5)
 
 
 def _layer_coverage(grid: Grid, state: State, theta: Floats, layer: str) -> Floats | None:
