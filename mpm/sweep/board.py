@@ -76,20 +76,21 @@ class Board:
             )
 
     def refresh(self) -> None:
-        """Redraw the live line; also to be called from time to time for the number of slots."""
+        """Redraw the live line. To be called every second or so: asking for the slots finds out when they are gone."""
+        state = self.state()
         if self._display is not None:
-            self._display.update(self._task, completed=self.total - self.left, state=self.state())
+            self._display.update(self._task, completed=self.total - self.left, state=state)
 
     def state(self) -> str:
         """done / running / failed, time left, in words."""
-        slots = max(1, self.slots())
-        parts = [f"{self.counts['done']} done", f"{min(self.slots(), self.left)} running"]
+        slots = self.slots()
+        parts = [f"{self.counts['done']} done", f"{min(slots, self.left)} running"]
         parts += [
             f"{self.counts[key]} {word}" for key, word in WORDS.items() if key != "done" and self.counts[key]
         ]
         if self.left and self.seconds:
             mean = sum(self.seconds) / len(self.seconds)
-            parts.append(f"{clock(mean * max(self.left, slots) / slots)} left")
+            parts.append(f"{clock(mean * max(self.left / max(slots, 1), 1.0))} left")
         return ", ".join(parts)
 
 

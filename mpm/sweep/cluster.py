@@ -6,6 +6,7 @@ The sweep's directory must be on storage that the workers share, and they need t
 """
 
 import contextlib
+import logging
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -20,9 +21,13 @@ SLURM_OWN = ("points_per_job", "workers")
 """Keys of [sweep.slurm] that are ours; all others go to dask_jobqueue.SLURMCluster as they are."""
 
 
+class PoolLost(Exception):
+    """Nobody runs points any more."""
+
+
 @dataclass(frozen=True)
 class Pool:
-    """An executor, the number of points it runs at a time (it may change), and its name for people."""
+    """An executor, the number of points it runs at a time (it may change; PoolLost), and its name for people."""
 
     executor: Executor
     slots: Callable[[], int]
@@ -48,6 +53,9 @@ def local_pool(jobs: int) -> Iterator[Pool]:
 def dask_pool(address: Any, label: str) -> Iterator[Pool]:
     """The workers of a running Dask scheduler (`tcp://host:8786`, or a cluster object)."""
     distributed = _distributed()
+    logging.getLogger("distributed.client").setLevel(
+        logging.CRITICAL
+    )  # tracebacks of a lost scheduler: PoolLost says it
     try:
         client = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
@@ -58,10 +66,17 @@ def dask_pool(address: Any, label: str) -> Iterator[Pool]:
             f"{address!r} ({reason})",
             "the address of a running Dask scheduler, or slurm",
         ) from None
+
+    def slots() -> int:
+        try:
+            return sum(client.nthreads().values())
+        except (OSError, TimeoutError) as error:
+            raise PoolLost(f"{label} does not answer any more") from error
+
     with client:
         # pure=False: the driver, not Dask's cache, knows which points are finished
         executor = client.get_executor(pure=False)
-        yield Pool(executor, lambda: sum(client.nthreads().values()), label)
+        yield Pool(executor, slots, label)
 
 
 def slurm_options(options: Mapping[str, Any], ranks: int, log: Path) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from typing import Any
 from mpm.errors import InputError
 from mpm.files import write_atomically
 from mpm.sweep.board import Board, now, say
-from mpm.sweep.cluster import Pool, open_pool
+from mpm.sweep.cluster import Pool, PoolLost, open_pool
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.lease import Lease
 from mpm.sweep.pictures import draw
@@ -223,6 +223,8 @@ class Collector:
                     future.add_done_callback(self._ended.put)
                 while self._names:
                     self._take(board)
+            except PoolLost as loss:
+                say(f"{loss}; what is finished is kept")
             except KeyboardInterrupt:
                 say(f"interrupted; running points get {GRACE:g} s to save their restart state")
                 lease.revoke()
@@ -244,8 +246,8 @@ class Collector:
             record = future.result()
         except InputError:  # this worker can run none of the points
             raise
-        except CancelledError:
-            record = {}
+        except CancelledError as error:  # we cancel nothing: Dask does when its scheduler is lost
+            raise PoolLost(f"{self.pool.label} is lost") from error
         except (
             Exception
         ) as error:  # Dask gave up on a point that took its workers with it, in many classes of error

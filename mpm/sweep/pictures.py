@@ -89,7 +89,7 @@ def edges(levels: np.ndarray, logarithmic: bool) -> np.ndarray:
 
 def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: str) -> None:
     """One number over two axes, with contour lines where there are enough neighbours."""
-    from matplotlib.patheffects import withStroke
+    from matplotlib.patheffects import AbstractPathEffect, withStroke
 
     columns, rows = np.unique(x.positions), np.unique(y.positions)
     field = np.full((len(rows), len(columns)), np.nan)
@@ -104,7 +104,8 @@ def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: st
     figure.colorbar(mesh, ax=axes, label=label)
     if not (x.words or y.words) and np.ptp(field.compressed()) > 0:
         lines = axes.contour(columns, rows, field, colors="white", linewidths=0.8)
-        outline = [withStroke(linewidth=2, foreground="0.2")]  # legible on the light end of the map, too
+        # legible on the light end of the map, too
+        outline: list[AbstractPathEffect] = [withStroke(linewidth=2, foreground="0.2")]
         lines.set_path_effects(outline)
         for text in axes.clabel(lines, fontsize="small"):
             text.set_path_effects(outline)

@@ -153,7 +153,7 @@ class Bench:
             return False
 
     @staticmethod
-    def wait_for(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> None:
         """Until the condition holds; fails after `seconds`."""
         deadline = time.monotonic() + seconds
         while not condition():

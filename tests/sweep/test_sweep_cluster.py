@@ -48,6 +48,7 @@ def dask(bench):
             client.wait_for_workers(workers, timeout=60)
             return client.scheduler.address, started
 
+    cluster.processes = processes
     yield cluster
     for process in reversed(processes):
         process.kill()
@@ -96,6 +97,22 @@ def test_an_interrupted_dask_sweep_stops_its_points_on_the_workers(bench, dask):
     assert not any(bench.alive(int(event[1])) for event in bench.events("start"))
     assert Counter(bench.table().status) == {"interrupted": 2, "pending": 1}
     assert bench.run(scheduler=address)[0] == 0
+    assert set(bench.names("step").values()) == {20}
+
+
+def test_a_lost_scheduler_ends_the_sweep_with_what_is_finished(bench, dask):
+    """Fails when the driver waits for ever, shows tracebacks, or the next call starts over."""
+    bench.delay = 1.0
+    bench.sweep("[0.1, 0.2, 0.3, 0.4]")
+    address, _ = dask(1)
+    driver = bench.start(scheduler=address)
+    bench.wait_for(lambda: len(bench.events("stop")) == 1 and len(bench.events("start")) == 2)
+    dask.processes[0].kill()
+    _, messages = driver.communicate(timeout=90)
+    assert driver.returncode == 3, messages
+    assert f"the Dask cluster at {address}" in messages.splitlines()[-2] and "Traceback" not in messages
+    bench.wait_for(lambda: not any(bench.alive(int(event[1])) for event in bench.events("start")))
+    assert bench.run()[0] == 0
     assert set(bench.names("step").values()) == {20}
 
 

@@ -20,7 +20,7 @@ def test_a_killed_driver_loses_nothing_and_leaves_nothing(bench):
     driver.wait()
     finished = set(bench.names("stop"))
     points = {int(event[1]) for event in bench.events("start")}
-    bench.wait_for(lambda: not any(bench.alive(pid) for pid in points), 5.0)
+    bench.wait_for(lambda: not any(bench.alive(pid) for pid in points), 10.0)
     assert finished and len(bench.names("start")) < 5
     status, messages = bench.run()
     assert status == 0, messages
