@@ -28,6 +28,7 @@ from mpm.parallel import is_root, largest, on_root, total
 from mpm.progress import Progress
 from mpm.replay import March, Replay
 from mpm.schedule import Schedule, Step
+from mpm.steady import SteadyProblem
 from mpm.strip import Strip
 from mpm.summary import history_row, summarise
 from mpm.transport import Transport
@@ -95,6 +96,8 @@ class Reactor:
         begun = clock.monotonic()
         directory = self._open(output, resume, overwrite)
         with Progress(self, progress) as bar, self._signals():
+            if self.case.fidelity == "steady":
+                return self._run_steady(directory, callback, bar, begun)
             try:
                 if not self._restored:
                     self._start(bar)
@@ -151,6 +154,34 @@ class Reactor:
 
             self.flows = Replay.solve(self.case, self.strip, self.motion, self.schedule, watch)
         self.flows.register(self.transport)
+
+    def _run_steady(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress, begun: float) -> Result:
+        """Find the quasi-steady state; the last iterate is written when that fails."""
+
+        def watch(iteration: int, residual: float) -> None:
+            bar.say(f"steady state, Newton step {iteration}, residual {residual:.1e} of the feed")
+            self._check_stop()
+
+        self._start(bar)
+        assert self.flows is not None
+        problem = SteadyProblem(self, 0, watch)
+        try:
+            problem.solve()
+            status, error = "done", None
+        except (ConvergenceError, Interrupted) as stopped:
+            status, error = ("interrupted" if isinstance(stopped, Interrupted) else "failed"), stopped
+            log.error("%s", stopped)
+        problem.settle_accounts()
+        self.steps = problem.iterations
+        self.sites_initially = total(self.comm, self.bed.content())
+        self.stored_initially = total(self.comm, self.transport.concentration @ self.transport.gas_volume)
+        self._write(directory, callback if error is None else None, None)
+        summary = summarise(self, status, clock.monotonic() - begun)
+        if directory is not None:
+            on_root(self.comm, lambda: directory.write_summary(summary))
+        if error is not None:
+            raise error
+        return Result(self, summary)
 
     def _march(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress) -> None:
         assert self.flows is not None

@@ -31,9 +31,10 @@ class Replay:
     def solve(
         cls, case: Case, strip: Strip, bed: BedMotion, schedule: Schedule, watch: Callable[[int, float], None] | None
     ) -> Replay:
-        """Find the fields of a developed run: the resolved cycle, or the steady flow under its mean forcing."""
+        """Find the fields of a developed run: the resolved cycle, or the steady flow under its mean forcing (alone where the
+        fidelity is steady)."""
         problem = FlowProblem(case, strip, schedule.dt)
-        rests = schedule.resting_steps > 0
+        rests = schedule.resting_steps > 0 and case.fidelity != "steady"
         fields = [steady_flow(problem)] if rests else []
         if case.fidelity == "resolved":
             fields += periodic_flow(problem, bed, schedule.phases, watch)

@@ -24,7 +24,7 @@ from mpm.flow import FaceFlow
 from mpm.fluxes import FluxAssembler, FluxOperator
 from mpm.kinetics import GasKinetics, Roles, SurfaceKinetics
 from mpm.parallel import largest, total
-from mpm.solvers import KrylovSolver
+from mpm.solvers import DirectSolver, KrylovSolver
 from mpm.strip import Strip
 
 if TYPE_CHECKING:
@@ -183,6 +183,32 @@ class Transport:
             linear.key = None
         self._jacobian_key = None
 
+    def operators(self, number: int) -> list[FluxOperator]:
+        """The operator of each species for velocity field `number`."""
+        return [self._flows[number][group] for group in self._group]
+
+    # --- without a time step ---
+
+    def flux_product(self, operators: list[FluxOperator], concentration: Floats) -> Floats:
+        """div(u C - D grad C) integrated over own cells for each species, (species, own) [mol/m/s]; nothing enters through ports."""
+        result = np.empty_like(concentration)
+        for i, operator in enumerate(operators):
+            group = self._group[i]
+            linear = self._linear[group]
+            if linear.key != (id(operator), 0.0):
+                linear.update(operator, np.inf)
+                linear.key = (id(operator), 0.0)
+            result[i] = linear.multiply(concentration[i])
+        return result
+
+    def solve_steady(self, i: int, operator: FluxOperator, supply: Floats) -> Floats:
+        """Concentration of species `i` without storage under `supply` [mol/m/s], by a direct solver."""
+        matrix = _StepMatrix(self.strip, self.gas_volume, self.names[i])
+        matrix.update(operator, np.inf)
+        matrix.y.array[:] = supply
+        DirectSolver(matrix.cells.matrix, f"steady {self.names[i]}").solve(matrix.y, matrix.x)
+        return matrix.x.array.copy()
+
     # --- one step ---
 
     def advance(self, number: int, t0: float, t1: float, halvings: int = 0) -> None:
@@ -208,10 +234,11 @@ class Transport:
 
     def _advance(self, number: int, t0: float, t1: float) -> None:
         dt = t1 - t0
-        operators = [self._flows[number][group] for group in self._group]
+        operators = self.operators(number)
         old, coupled = self.concentration, len(self.roles.coupled)
-        drawn = self._outlet_means(operators[0]) if self.names and operators[0].drawn_in else {}
-        supply = self._supply(operators, t0, t1, drawn)
+        drawn = self.outlet_means(operators, old)
+        shares = np.array([open_share(inlet, t0, t1) for inlet in self.case.geometry.inlets])
+        supply = self.supply(operators, shares, drawn)
         new = old.copy()
         theta = self.bed.theta
         if coupled:
@@ -228,28 +255,33 @@ class Transport:
             made += self.nu_gas[:, i] @ gas_events / dt
             new[i] = self._solve_linear(i, number, dt, old[i], made)
         self.concentration = new
-        self._book(operators, dt, t0, t1, drawn, events, gas_events)
+        self.book(operators, dt, shares, drawn, events, gas_events)
 
-    def _supply(self, operators: list[FluxOperator], t0: float, t1: float, drawn: dict[str, Floats]) -> Floats:
-        """What enters each cell through ports, (species, own) [mol/m/s]."""
-        supply = np.zeros_like(self.concentration)
-        for inlet in self.case.geometry.inlets:
-            share = open_share(inlet, t0, t1)
-            for i, name in enumerate(self.names):
-                c = self.feed[inlet.name].get(name, 0.0) * share
+    def supply(self, operators: list[FluxOperator], shares: Floats, drawn: dict[str, Floats]) -> Floats:
+        """What enters each cell through ports, (species, own) [mol/m/s].
+
+        `shares` (inlets,): part of the time during which each inlet doses; `drawn`: concentrations in what outlets draw back in.
+        """
+        supply = np.zeros((len(operators), self.strip.owned))
+        for inlet, share in zip(self.case.geometry.inlets, shares, strict=True):
+            for i, operator in enumerate(operators):
+                c = self.feed[inlet.name].get(self.names[i], 0.0) * share
                 if c > 0.0:
-                    port = operators[i].inlets[inlet.name]
+                    port = operator.inlets[inlet.name]
                     supply[i, port.cells] += port.into * c
         for name, means in drawn.items():
             port = operators[0].outlets[name]
             supply[:, port.cells] += port.into * means[:, None]
         return supply
 
-    def _outlet_means(self, operator: FluxOperator) -> dict[str, Floats]:
-        """Area mean of the cells next to each outlet, (species,) [mol/m3]; collective."""
+    def outlet_means(self, operators: list[FluxOperator], concentration: Floats) -> dict[str, Floats]:
+        """Area mean of the cells next to each outlet, (species,) [mol/m3], where any outlet draws in (else nothing); collective."""
+        if not operators or not operators[0].drawn_in:
+            return {}
+        operator = operators[0]
         sums = []
         for port in operator.outlets.values():
-            sums.append([*(self.concentration[:, port.cells] @ port.area), port.area.sum()])
+            sums.append([*(concentration[:, port.cells] @ port.area), port.area.sum()])
         sums = total(self.strip.comm, sums)
         return {name: row[:-1] / row[-1] for name, row in zip(operator.outlets, sums, strict=True)}
 
@@ -307,17 +339,16 @@ class Transport:
             f"{worst:.3g} of the feed, lowest concentration {low:.3g} mol/m3"
         )
 
-    def _book(
+    def book(
         self,
         operators: list[FluxOperator],
         dt: float,
-        t0: float,
-        t1: float,
+        shares: Floats,
         drawn: dict[str, Floats],
         events: Floats,
         gas_events: Floats,
     ) -> None:
-        """Enter the step into the ledger."""
+        """Enter `dt` [s] at the present concentrations into the ledger, with the events [mol/m] of that time."""
         ledger = self.ledger
         ledger.surface_events += events
         ledger.gas_events += gas_events
@@ -325,7 +356,7 @@ class Transport:
             c = self.concentration[i]
             for k, inlet in enumerate(self.case.geometry.inlets):
                 port = operators[i].inlets[inlet.name]
-                inside = self.feed[inlet.name].get(self.names[i], 0.0) * open_share(inlet, t0, t1)
+                inside = self.feed[inlet.name].get(self.names[i], 0.0) * shares[k]
                 ledger.fed[k, i] += dt * (port.into.sum() * inside - port.out @ c[port.cells])
             for k, (name, port) in enumerate(operators[i].outlets.items()):
                 ledger.out[k, i] += dt * (port.out @ c[port.cells])
@@ -371,3 +402,8 @@ def open_share(inlet: Inlet, t0: float, t1: float) -> float:
     """Share of the step from `t0` to `t1` during which the inlet doses."""
     dosing = sum(max(min(stop, t1) - max(start, t0), 0.0) for start, stop in inlet.windows)
     return dosing / (t1 - t0)
+
+
+def stays_open(inlet: Inlet) -> float:
+    """1 when the inlet doses for ever (its last window has no end), else 0."""
+    return float(inlet.windows[-1][1] == np.inf)
