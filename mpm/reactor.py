@@ -95,12 +95,15 @@ class Reactor:
         """
         begun = clock.monotonic()
         directory = self._open(output, resume, overwrite)
-        with Progress(self, progress) as bar, self._signals():
+        with self._logging(directory), Progress(self, progress) as bar, self._signals():
             if self.case.fidelity == "steady":
                 return self._run_steady(directory, callback, bar, begun)
             try:
-                if not self._restored:
+                if self._restored:
+                    log.info("resumed at t = %g s, after step %d", self.time, self.steps)
+                else:
                     self._start(bar)
+                    log.info("flow found after %.1f s", clock.monotonic() - begun)
                     self._write(directory, callback, None)
                 self._march(directory, callback, bar)
             except (ConvergenceError, Interrupted) as error:
@@ -188,9 +191,10 @@ class Reactor:
         last_checkpoint = clock.monotonic()
         for step in self.schedule.from_step(self.steps):
             self._take(step)
+            bar.advance()
             if self.schedule.is_output(step, self.case.output.every):
                 self._write(directory, callback, step)
-            bar.advance()
+                log.info("%s", bar.line())
             due = clock.monotonic() - last_checkpoint > self.case.output.checkpoint
             stop, due = largest(self.comm, [self._stop, due and is_root(self.comm)]) > 0.0
             if due and directory is not None:
@@ -216,6 +220,21 @@ class Reactor:
     def _check_stop(self) -> None:
         if largest(self.comm, [self._stop])[0] > 0.0:
             raise Interrupted("interrupted while the flow was being found; nothing but the case has been written")
+
+    @contextmanager
+    def _logging(self, directory: RunDirectory | None) -> Iterator[None]:
+        """Let rank 0 add what happens to run.log."""
+        to_file = directory is not None and is_root(self.comm)
+        handler = logging.FileHandler(directory.log) if directory is not None and to_file else logging.NullHandler()
+        handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+        log.setLevel(logging.INFO)
+        log.addHandler(handler)
+        log.info("%s: %s, %d cells, %d ranks", self.case.title, self.case.fidelity, self.grid.cells, self.comm.size)
+        try:
+            yield
+        finally:
+            log.removeHandler(handler)
+            handler.close()
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
