@@ -20,6 +20,7 @@ pictures = ["titration.*"]
 key = "geometry.inlet.tma.mass_fractions.TMA"
 name = "Y_TMA"
 values = {doses}
+{more}
 [sweep.set]
 "geometry.cell_width" = "4 mm"
 "time.end" = "{end}"
@@ -43,19 +44,22 @@ def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.returncode, messages
 
 
-def test_a_coarse_zone_over_three_doses(tmp_path):
-    """Fails when the points' runs do not start as the driver starts them, or numbers land in the wrong row."""
-    (tmp_path / "doses.toml").write_text(SWEEP.format(doses="[1e-4, 2e-4, 1.5]", end="1 s"))
+def test_a_coarse_zone_with_a_failing_and_a_refused_point(tmp_path):
+    """Fails when runs do not start as the driver starts them, numbers land in the wrong row, or a status is another."""
+    thin = '[[sweep.axis]]\nkey = "gas.viscosity"\nname = "mu"\n'
+    thin += 'values = ["1.72e-5 Pa s", "1.72e-5 Pa s", "1e-12 Pa s", "1.72e-5 Pa s"]\n'
+    text = SWEEP.format(doses="[1e-4, 2e-4, 2e-4, 1.5]", end="1 s", more=thin)
+    (tmp_path / "doses.toml").write_text(text.replace("[sweep]", '[sweep]\nmode = "zip"'))
     status, messages = finish(command(tmp_path, "out", "-j", "2"))
     assert status == 0, messages
     data = mpm.load_sweep(tmp_path / "out")
-    assert data.status.values.tolist() == ["done", "done", "bad_input"]
-    assert "mass_fractions.TMA: found 1.5" in data.error.values[2]
-    assert data["species.TMA.fed"].attrs["units"] == "mol/m"
-    low, high, refused = data["species.TMA.fed"].values
-    assert high / low == pytest.approx(2.0, rel=1e-3) and np.isnan(refused)
-    assert (data["species.TMA.balance_error"].values[:2] < 1e-9).all()
-    for point in data.point.values[:2]:
+    assert data.status.tolist() == ["done", "done", "failed", "bad_input"]
+    assert data.error[2].startswith("flow") and "1.5" in data.error[3]
+    assert data.attrs["units"]["species.TMA.fed"] == "mol/m"
+    low, high, *none = data["species.TMA.fed"]
+    assert high / low == pytest.approx(2.0, rel=1e-3) and np.isnan(none).all()
+    assert (data["species.TMA.balance_error"][:2] < 1e-9).all()
+    for point in data.point[:2]:
         run = tmp_path / "out" / "points" / point
         assert {"case.toml", "summary.json", "history.csv", "fields.pvd"} <= {
             file.name for file in run.iterdir()
@@ -66,7 +70,7 @@ def test_a_coarse_zone_over_three_doses(tmp_path):
 @pytest.mark.slow
 def test_a_killed_reactor_goes_on_from_its_restart_state(tmp_path):
     """SIGKILL of the driver while the reactor runs. Fails when the run starts over or ends with other numbers."""
-    (tmp_path / "doses.toml").write_text(SWEEP.format(doses="[2e-4]", end="40 s"))
+    (tmp_path / "doses.toml").write_text(SWEEP.format(doses="[2e-4]", end="15 s", more=""))
     driver = command(tmp_path, "out", "-j", "1")
     deadline = time.monotonic() + 120
     while not list((tmp_path / "out" / "points").glob("*/checkpoint.npz")):
@@ -87,7 +91,7 @@ def test_a_killed_reactor_goes_on_from_its_restart_state(tmp_path):
 
 def test_the_command_line_ends_with_2_and_one_line(tmp_path):
     """Fails when `mpm sweep` answers a mistake otherwise than `mpm run` does, or writes anything."""
-    (tmp_path / "doses.toml").write_text(SWEEP.format(doses='["1e-4 mm"]', end="1 s"))
+    (tmp_path / "doses.toml").write_text(SWEEP.format(doses='["1e-4 mm"]', end="1 s", more=""))
     status, messages = finish(command(tmp_path, "out"))
     assert status == 2 and messages.count("\n") == 1
     assert "mass_fractions.TMA: found '1e-4 mm'; accepted: a fraction" in messages
