@@ -1,8 +1,12 @@
-"""The live line of a run: simulated time, steps per second, time left, worst balance. Only rank 0 prints."""
+"""What a run says about itself: its log, and the live line with simulated time, steps per second, time left, worst balance. Only rank 0 prints."""
 
 from __future__ import annotations
 
+import logging
 import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -12,6 +16,20 @@ from mpm.parallel import is_root
 
 if TYPE_CHECKING:
     from mpm.reactor import Reactor
+
+
+@contextmanager
+def log_file(log: logging.Logger, path: Path | None) -> Iterator[None]:
+    """Add the messages of `log` to the file `path`; without one they go nowhere."""
+    handler = logging.FileHandler(path) if path is not None else logging.NullHandler()
+    handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
+    log.setLevel(logging.INFO)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        handler.close()
 
 
 class Progress:
