@@ -25,7 +25,7 @@ from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, largest, on_root, total
-from mpm.progress import Progress
+from mpm.progress import Progress, log_file
 from mpm.replay import March, Replay
 from mpm.schedule import Schedule, Step
 from mpm.steady import SteadyProblem
@@ -95,7 +95,9 @@ class Reactor:
         """
         begun = clock.monotonic()
         directory = self._open(output, resume, overwrite)
-        with self._logging(directory), Progress(self, progress) as bar, self._signals():
+        file = directory.log if directory is not None and is_root(self.comm) else None
+        with log_file(log, file), Progress(self, progress) as bar, self._signals():
+            log.info("%s: %s, %d cells, %d ranks", self.case.title, self.case.fidelity, self.grid.cells, self.comm.size)
             if self.case.fidelity == "steady":
                 return self._run_steady(directory, callback, bar, begun)
             try:
@@ -220,21 +222,6 @@ class Reactor:
     def _check_stop(self) -> None:
         if largest(self.comm, [self._stop])[0] > 0.0:
             raise Interrupted("interrupted while the flow was being found; nothing but the case has been written")
-
-    @contextmanager
-    def _logging(self, directory: RunDirectory | None) -> Iterator[None]:
-        """Let rank 0 add what happens to run.log."""
-        to_file = directory is not None and is_root(self.comm)
-        handler = logging.FileHandler(directory.log) if directory is not None and to_file else logging.NullHandler()
-        handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
-        log.setLevel(logging.INFO)
-        log.addHandler(handler)
-        log.info("%s: %s, %d cells, %d ranks", self.case.title, self.case.fidelity, self.grid.cells, self.comm.size)
-        try:
-            yield
-        finally:
-            log.removeHandler(handler)
-            handler.close()
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
