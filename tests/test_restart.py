@@ -1,0 +1,246 @@
+"""Runs that are interrupted, killed, or fail go on to the result of an undisturbed one, on any number of ranks."""
+
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mpm.case import Case
+from mpm.errors import InputError, Interrupted
+from mpm.parallel import total
+from mpm.reactor import Reactor, Result
+from mpm.results import load_run
+
+from .cases import MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, run, zone
+
+COMM = MPI.COMM_WORLD
+MODES = {
+    "averaged": zone({**SHORT, "output.every": "0.1 s"}, TINY),
+    "resolved": zone({**SHORT, "fidelity": "resolved", "time.end": "0.6 s"}, TINY),
+    "impulsive": zone({**SHORT, "fidelity": "resolved", "time.end": "0.6 s", "motion.startup": "impulsive"}, TINY),
+    "lab": zone({**SHORT, "fidelity": "resolved", "time.end": "0.6 s", "motion.inlet_frame": "lab", "motion.gamma": 0.6}, TINY),
+    "periodic solids": zone({**SHORT, "geometry.bed_inflow": "periodic"}, TINY),
+    "both precursors": cycle({**SHORT, "time.end": "3 s", "geometry.inlet.water.start": "1 s"}, TINY),
+}
+
+
+def interrupted(case: Case, folder: Path, after: float, comm: MPI.Comm = COMM) -> None:
+    """Run `case` and ask it to stop at the first output time after `after` [s]."""
+
+    def stop(reactor: Reactor) -> None:
+        if reactor.time > after:
+            reactor._stop = True
+
+    with pytest.raises(Interrupted):
+        Reactor(case, comm).run(output=folder, callback=stop)
+
+
+def assert_same_state(one: Result, other: Result, tolerance: float) -> None:
+    """Concentrations (over the largest) and coverages of two results, cell by cell; collective."""
+    for name in ("TMA", "CH4", "H2O", "Al(OH)3"):
+        a, b = one.field(f"C_{name}"), other.field(f"C_{name}")
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * max(a.max(), 1e-12))
+    for layer in ("frit", "bed"):
+        np.testing.assert_allclose(one.coverage(layer, "OH"), other.coverage(layer, "OH"), rtol=0.0, atol=tolerance)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("mode", MODES)
+def test_resumed_run_equals_the_uninterrupted_one(mode: str, tmp_path: Path) -> None:
+    """Fails when anything that a run needs is missing from its restart state: on the same ranks all must agree to 1e-12."""
+    case = MODES[mode]
+    _, whole = run(case, COMM, output=tmp_path / "whole")
+    interrupted(case, tmp_path / "cut", 0.2)
+    _, resumed = run(case, COMM, output=tmp_path / "cut", resume=True)
+    assert_same_numbers(whole.summary, resumed.summary, 1e-12)
+    assert_same_state(whole, resumed, 1e-12)
+    assert whole.history.keys() == resumed.history.keys()
+    for name, values in whole.history.items():
+        if not name.startswith("balance."):
+            np.testing.assert_allclose(resumed.history[name], values, rtol=1e-9, atol=1e-15, err_msg=name)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("mode", ["resolved", "impulsive", "both precursors"])
+def test_restart_on_another_number_of_ranks(mode: str, tmp_path: Path) -> None:
+    """Fails when a restart state depends on the ranks that wrote it: one rank to all and all to one must agree with one to 1e-8."""
+    case = MODES[mode]
+    _, whole = run(case, MPI.COMM_SELF)
+    if COMM.rank == 0:
+        interrupted(case, tmp_path / "from-one", 0.2, MPI.COMM_SELF)
+    COMM.Barrier()
+    _, to_all = run(case, COMM, output=tmp_path / "from-one", resume=True)
+    assert_same_numbers(whole.summary, to_all.summary, 1e-8)
+    assert_same_state(whole, to_all, 1e-8)
+
+    interrupted(case, tmp_path / "from-all", 0.2)
+    if COMM.rank == 0:
+        _, to_one = run(case, MPI.COMM_SELF, output=tmp_path / "from-all", resume=True)
+        assert_same_numbers(whole.summary, to_one.summary, 1e-8)
+    assert total(COMM, [1.0])[0] == COMM.size
+
+
+@pytest.mark.parallel
+def test_resume_accepts_a_later_end(tmp_path: Path) -> None:
+    """Fails when a finished run cannot be prolonged, the prolonged one differs from a run of that length, or another change is accepted."""
+    case = MODES["averaged"]
+    longer = case.with_({"time.end": "1.5 s"})
+    _, whole = run(longer, COMM)
+    run(case, COMM, output=tmp_path / "run")
+    with pytest.raises(InputError, match=r"motion\.gamma"):
+        Reactor(longer.with_({"motion.gamma": 0.4}), COMM).run(output=tmp_path / "run", resume=True)
+    with pytest.raises(InputError, match=r"time\.end"):
+        Reactor(case.with_({"time.end": "0.5 s"}), COMM).run(output=tmp_path / "run", resume=True)
+    _, prolonged = run(longer, COMM, output=tmp_path / "run", resume=True)
+    assert_same_numbers(whole.summary, prolonged.summary, 1e-12)
+    np.testing.assert_allclose(prolonged.history["time"], whole.history["time"], atol=1e-12)
+
+
+def test_resume_of_a_directory_without_a_state_starts_anew(tmp_path: Path) -> None:
+    """Fails when a run that was killed before its first restart state cannot be resumed."""
+    case = MODES["averaged"]
+    _, whole = run(case, output=tmp_path / "whole")
+    run(case, output=tmp_path / "cut")
+    (tmp_path / "cut" / "checkpoint.npz").unlink()
+    _, again = run(case, output=tmp_path / "cut", resume=True)
+    assert_same_numbers(whole.summary, again.summary, 1e-12)
+    np.testing.assert_array_equal(again.history["time"], whole.history["time"])
+
+
+# --- other processes: kill, terminate, fail ---
+
+LONG = {**SHORT, "fidelity": "resolved", "time.end": "4 s", "output.every": "0.1 s", "output.checkpoint": "0.1 s"}
+
+
+def start(case: Case, folder: Path, *options: str, prefix: list[str] | None = None, before: str = "") -> subprocess.Popen[str]:
+    """`mpm run` of `case` into `folder`/run in a process of its own; `before` is Python to execute first."""
+    file = folder / "case.toml"
+    file.write_text(case.to_toml())
+    code = f"import sys; {before or 'pass'}\nfrom mpm.cli import main; sys.exit(main(sys.argv[1:]))"
+    arguments = ["run", str(file), "-o", str(folder / "run"), "--quiet", *options]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[1])}
+    return subprocess.Popen(
+        [*(prefix or [sys.executable]), "-c", code, *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment, cwd=folder,
+    )  # fmt: skip
+
+
+def wait_for(process: subprocess.Popen[str], file: Path, seconds: float = 120.0) -> None:
+    """Wait until `file` is there or the process has ended."""
+    deadline = time.monotonic() + seconds
+    while not file.exists() and process.poll() is None:
+        assert time.monotonic() < deadline, f"no {file.name} after {seconds:g} s"
+        time.sleep(0.01)
+
+
+def finish(process: subprocess.Popen[str], status: int) -> str:
+    _, errors = process.communicate(timeout=240)
+    assert process.returncode == status, errors
+    return errors
+
+
+def summary_of(folder: Path) -> Mapping[str, Any]:
+    return json.loads((folder / "run" / "summary.json").read_text())
+
+
+def assert_same_files(one: Path, other: Path, tolerance: float) -> None:
+    """Final states and tables of two directories."""
+    assert_same_numbers(summary_of(one), summary_of(other), tolerance)
+    a, b = (np.load(folder / "run" / "checkpoint.npz", allow_pickle=False) for folder in (one, other))
+    for name in ("concentration", "theta"):
+        scale = float(np.abs(a[name]).max())
+        np.testing.assert_allclose(b[name], a[name], rtol=0.0, atol=tolerance * scale, err_msg=name)
+    tables = [(folder / "run" / "history.csv").read_text().splitlines() for folder in (one, other)]
+    assert [line.split(",")[0] for line in tables[0]] == [line.split(",")[0] for line in tables[1]]
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments(tmp_path: Path, mpirun: Any) -> None:
+    """Fails when SIGKILL at any moment leaves a directory that cannot be resumed, or one whose resumed run differs: by more than 1e-12 on
+    one rank, as before, or more than 1e-8 on two."""
+    case, seed = zone(LONG, TINY), random.randrange(10**6)
+    print(f"seed of the moments: {seed}")
+    moments = random.Random(seed)
+    folders = {name: tmp_path / name for name in ("whole", "killed", "two")}
+    for folder in folders.values():
+        folder.mkdir()
+    finish(start(case, folders["whole"]), 0)
+    killed = folders["killed"]
+    for attempt in range(3):
+        process = start(case, killed, *(["--resume"] if attempt else []))
+        if attempt != 1:  # the second one may die anywhere: while it imports, meshes, reads the state or writes
+            wait_for(process, killed / "run" / "checkpoint.npz")
+        time.sleep(moments.uniform(0.0, 4.0 if attempt == 1 else 1.0))
+        assert process.poll() is None, process.communicate()
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+    shutil.copytree(killed / "run", folders["two"] / "run")
+    for line in (killed / "run" / "history.csv").read_text().splitlines()[1:]:
+        assert np.isfinite([float(v) for v in line.split(",") if v]).all()
+    finish(start(case, killed, "--resume"), 0)
+    assert_same_files(folders["whole"], killed, 1e-12)
+    finish(start(case, folders["two"], "--resume", prefix=mpirun(2)), 0)
+    assert_same_files(folders["whole"], folders["two"], 1e-8)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_end_a_run_in_order(number: signal.Signals, tmp_path: Path) -> None:
+    """Fails when SIGTERM or Ctrl-C does not end a run with status 130, one line and a directory that can be read and resumed."""
+    case = zone(LONG, TINY)
+    process = start(case, tmp_path)
+    wait_for(process, tmp_path / "run" / "checkpoint.npz")
+    process.send_signal(number)
+    line = finish(process, 130)
+    assert "interrupted at t = " in line and "Traceback" not in line and len(line.strip().splitlines()) == 1
+    summary = summary_of(tmp_path)
+    assert line.strip() in (tmp_path / "run" / "run.log").read_text()
+    assert summary["status"] == "interrupted" and 0.0 < summary["simulated_seconds"] < 4.0
+    found = load_run(tmp_path / "run")
+    assert found.snapshot().cell_data["C_TMA"].shape == (found.grid.cells,)
+    shorter = case.with_({"time.end": f"{summary['simulated_seconds'] + 0.1!r} s"})
+    _, resumed = run(shorter, output=tmp_path / "run", resume=True)
+    assert resumed.summary["status"] == "done"
+
+
+def test_numerical_failure_ends_with_status_3(tmp_path: Path) -> None:
+    """Fails when a run that cannot go on does not end with status 3 and one line, or `--resume` does not take it up from the last good
+    state (here: Newton's limit is spoilt after 20 steps of the first attempt)."""
+    case = zone({**SHORT, "time.end": "0.6 s"}, TINY)
+    spoil = (
+        "import mpm.transport as t; advance = t.Transport.advance\n"
+        "def spoilt(self, number, t0, t1, halvings=0):\n"
+        "    t.NEWTON_LIMIT = 1 if t0 > 0.3 else 30\n"
+        "    return advance(self, number, t0, t1, halvings)\n"
+        "t.Transport.advance = spoilt"
+    )
+    line = finish(start(case, tmp_path, before=spoil), 3)
+    assert "Newton stopped after" in line and "Traceback" not in line and len(line.strip().splitlines()) == 1, line
+    summary = summary_of(tmp_path)
+    assert summary["status"] == "failed" and 0.3 < summary["simulated_seconds"] < 0.4
+    finish(start(case, tmp_path, "--resume"), 0)
+    _, whole = run(case)
+    assert summary_of(tmp_path)["status"] == "done"
+    assert_same_numbers(whole.summary, summary_of(tmp_path), 1e-12)
+
+
+def test_laws_hold_at_every_step() -> None:
+    """Fails when a balance or bound is broken between output times: every single step of a resolved run is looked at."""
+    reactor = Reactor(zone({**SHORT, "fidelity": "resolved", "time.end": "0.3 s", "output.every": "1 ms"}, TINY), MPI.COMM_SELF)
+    seen: list[float] = []
+
+    def look(r: Reactor) -> None:
+        assert_laws(r)
+        seen.append(r.time)
+
+    reactor.run(callback=look)
+    assert len(seen) == reactor.schedule.steps + 1
