@@ -29,15 +29,21 @@ UNITS: tuple[tuple[str, str], ...] = (
     (r"flow\.\w+_pressure_drop", "Pa"),
     (r"cvd\.rate_(mean|max)", "mol/m^3/s"),
     (r"(simulated|wall)_seconds", "s"),
+    (r"front\..*", "m"),
+    (r"film\..*\.per_area", "mol/m^2"),
+    (r"film\..*\.thickness", "m"),
 )
 """Units of summary.json by dotted name; everything else there is a pure number or a count."""
-SPECIES = re.compile(r"species\.[^.]+\.(fed|left|reacted|stored|produced)")
+AMOUNT = re.compile(
+    r"species\.[^.]+\.(fed|left|reacted|stored|produced)|film\..*\.amount|cvd\.total(_in_zone\..*)?"
+)
+"""Amounts per metre of depth; of a steady state per second."""
 Row = dict[str, float | str | None]
 
 
 def unit_of(column: str, steady: bool) -> str:
     """SI unit of a number of summary.json; "1" for pure numbers and counts."""
-    if SPECIES.fullmatch(column):
+    if AMOUNT.fullmatch(column):
         return "mol/m/s" if steady else "mol/m"
     return next((unit for pattern, unit in UNITS if re.fullmatch(pattern, column)), "1")
 
