@@ -76,6 +76,15 @@ ROWS: dict[str, Row] = {
         "GL56 (one size), Gamma 0.30, air, angle from the horizontal", "1.3",
         sixteen("GL56", 0.30, FINE, angle_from="horizontal"),
     ),
+    "gl223_030_45": (
+        "GL223, Gamma 0.30, air, 45 deg", "0.58", sixteen("GL223", 0.30, COARSE, angle="45 deg"),
+    ),
+    "gl223_050_45": (
+        "GL223, Gamma 0.50, air, 45 deg", "2.03", sixteen("GL223", 0.50, COARSE, angle="45 deg"),
+    ),
+    "gl56_030_45": (
+        "GL56 (one size), Gamma 0.30, air, 45 deg", "1.3", sixteen("GL56", 0.30, FINE, angle="45 deg"),
+    ),
     "sine_105_full": (
         "GL50, sine 1.05 g, cohesion not reduced", "1.08-3.51",
         glass({"kind": "seed", "harmonics": 1}, {**SMALL, "reduced_cohesion": False}),

@@ -18,11 +18,12 @@ from .relations import (
     straight_drop_velocity,
     throw_number,
     wen_yu_minimum_fluidisation,
-)  # fmt: skip
+)
 from .waveform import Waveform, extension_velocity, peak_displacement
 
 Arrays = dict[str, np.ndarray]
-OPEN_GAP = 0.1  # of the mean diameter: the gap under the bed counts as open above it
+OPEN_GAP = 0.1  # of the mean diameter: the lowest layers count as lifted above it
+LIFTED = 0.25  # the same for the centre of mass, which a bed that only dilates raises by 0.15 (15 layers)
 ACCELERATION_DEVIATION = 1.0  # m/s2, the seed's criterion of lift-off (section 3.4.4)
 
 
@@ -33,6 +34,7 @@ class Results:
     curve: Profile
     base: np.ndarray
     gap: np.ndarray
+    rise: np.ndarray
     coordination: np.ndarray
     fit: PiecewiseFit
     seed_velocities: np.ndarray
@@ -71,8 +73,17 @@ def gap_over_phase(arrays: Arrays, samples: int, discard: int) -> np.ndarray:
     return height - height.min(axis=1, keepdims=True)
 
 
+def rise_over_phase(arrays: Arrays, samples: int, discard: int) -> np.ndarray:
+    """Rise of the centre of mass above its lowest position in each kept cycle [m], (kept cycles, samples)."""
+    edges = arrays["edges"]
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    solid = over_phase(arrays["solid"], samples, discard)
+    height = solid @ centres / solid.sum(axis=-1)
+    return height - height.min(axis=1, keepdims=True)
+
+
 def flight_interval(phase: np.ndarray, gap: np.ndarray, limit: float) -> tuple[float, float] | None:
-    """(lift-off, contact) phases [deg] of the longest interval in which the gap stays above `limit`, or None.
+    """(lift-off, contact) phases [deg] of the longest interval in which gap or rise stay above `limit`, or None.
 
     Crossings are interpolated linearly; the cycle is closed. None also when the gap never closes.
     """
@@ -158,7 +169,8 @@ def analyse(case: DemCase, spec: BoxSpec, masses: list[np.ndarray], records: lis
         [cycle_velocities(r, m, waveform, discard) for r, m in zip(records, masses, strict=True)]
     )
     gaps = np.concatenate([gap_over_phase(r, samples, discard) for r in records])
-    contact = (gaps <= OPEN_GAP * spec.powder.diameter).mean(axis=0)
+    rises = np.concatenate([rise_over_phase(r, samples, discard) for r in records])
+    contact = (rises <= LIFTED * spec.powder.diameter).mean(axis=0)
     curve = Profile(phase, mean_over("velocity").T, contact)
     base = waveform.velocity(times)
     residence = np.concatenate(
@@ -175,6 +187,7 @@ def analyse(case: DemCase, spec: BoxSpec, masses: list[np.ndarray], records: lis
         curve=curve,
         base=base,
         gap=gaps.mean(axis=0),
+        rise=rises.mean(axis=0),
         coordination=2.0 * mean_over("pairs"),
         fit=piecewise_fit(curve, base),
         seed_velocities=cycles.mean(axis=1),
@@ -203,7 +216,8 @@ def _summary(
     run, powder, period = case.run, spec.powder, 1.0 / waveform.frequency
     seeds = results.seed_velocities
     mean = float(seeds.mean())
-    interval = flight_interval(results.curve.phase, results.gap, OPEN_GAP * powder.diameter)
+    bulk = flight_interval(results.curve.phase, results.rise, LIFTED * powder.diameter)
+    layers = flight_interval(results.curve.phase, results.gap, OPEN_GAP * powder.diameter)
     criterion = acceleration_liftoff(results.curve, results.base, period)
     x, z = peak_displacement(waveform)
     d_one = np.mean([self_diffusivity(r, run.discard, period) for r in records], axis=0)
@@ -232,9 +246,12 @@ def _summary(
             "throw_number": throw_number(z, waveform.frequency, case.box.declination),
         },
         "liftoff": {
-            "phase_deg": interval[0] if interval else None,
-            "contact_phase_deg": interval[1] if interval else None,
+            "phase_deg": bulk[0] if bulk else None,
+            "contact_phase_deg": bulk[1] if bulk else None,
+            "lowest_layers_phase_deg": layers[0] if layers else None,
+            "lowest_layers_contact_phase_deg": layers[1] if layers else None,
             "flight_share": float((results.curve.contact < 0.5).mean()),
+            "largest_rise": float(results.rise.max()),
             "largest_gap": float(results.gap.max()),
             "acceleration_phase_deg": criterion[0] if criterion else None,
             "acceleration_delay": criterion[1] if criterion else None,

@@ -136,9 +136,11 @@ def _velocity(case: DemCase, results: Results) -> Figure:
         axis.axhline(0, color="0.6", lw=0.6)
     upper.axhline(100 * results.seed_velocities.mean(), color=BED, lw=0.8, ls=":", label="cycle mean")
     upper.legend(loc="upper right", frameon=False)
-    upper.set_title(f"{case.title} (grey: gap open)", fontsize=10)
-    lower.plot(phase, 1e6 * results.gap, color=BASE)
-    lower.set_ylabel("gap [µm]", color=BASE)
+    upper.set_title(f"{case.title} (grey: lifted)", fontsize=10)
+    lower.plot(phase, 1e6 * results.rise, color=BASE, label="centre of mass")
+    lower.plot(phase, 1e6 * results.gap, color=BASE, ls=":", label="lowest layers")
+    lower.legend(loc="upper left", frameon=False)
+    lower.set_ylabel("rise [µm]", color=BASE)
     other = lower.twinx()
     other.plot(phase, results.coordination, color=BED)
     other.set_ylabel("contacts per particle", color=BED)
@@ -155,7 +157,10 @@ def _voidage(case: DemCase, results: Results) -> Figure:
         results.curve.phase, results.heights / d, 1.0 - results.solid.T, vmin=0.3, vmax=1.0, cmap="cividis"
     )
     figure.colorbar(image, label="voidage")
-    axis.set(xlabel="phase [deg]", ylabel="height above the base [d]", title=case.title)
+    highest = results.heights[results.solid.max(axis=0) > 0.01].max() / d
+    axis.set(
+        xlabel="phase [deg]", ylabel="height above the base [d]", title=case.title, ylim=(0, highest + 2)
+    )
     return figure
 
 
@@ -187,9 +192,10 @@ def _residence(case: DemCase, results: Results) -> Figure:
 
 def _bed(spec: BoxSpec, particles: Particles) -> Figure:
     """Side view of the last state, coloured by the velocity along the base relative to it."""
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
-    axis = figure.subplots()
     position = particles.position.copy()
+    tall = 1.15 * float(position[:, 2].max()) / spec.length
+    figure = Figure(figsize=(min(8.0, 5.0 / tall) + 1.5, min(8.0 * tall, 5.0) + 0.8), layout="constrained")
+    axis = figure.subplots()
     position[:, 0] %= spec.length
     order = np.argsort(-position[:, 1])
     radius = spec.diameters[particles.classes] / 2.0
