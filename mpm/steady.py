@@ -33,6 +33,7 @@ FIRST_STEP, LAST_STEP = 1.0, 1e12  # s, pseudo-time steps; a storage term over t
 SETTLED = 0.05  # residual over feed at which the continuation goes on
 CONVERGED, ROUNDING = 1e-11, 1e-10  # of the largest feed: sum of |residual|; the second is accepted when nothing improves any more
 TRIES, LAST_TRIES = 12, 60  # Newton iterations per stage and for the last one
+FINEST = 1.03  # smallest factor of the continuation
 SHORTEST = 1.0 / 64.0  # of a Newton step, in the line search
 
 
@@ -253,24 +254,28 @@ class SteadyProblem:
                 trial = min(softness * factor, 1.0)
                 surface.constant = [trial * k for k in true]
                 self.sweep(LAST_STEP)
-                if self.relax(LAST_STEP, TRIES, SETTLED) < SETTLED:
+                if self._finish() if trial == 1.0 else self.relax(LAST_STEP, TRIES, SETTLED) < SETTLED:
                     softness, factor = trial, min(1.5 * factor, 10.0)
                     self.keep()
                     continue
+                if factor < FINEST:
+                    raise self._failure(f"with surface rates at {trial:.3g} of their values", LAST_STEP)
                 self.recall()
                 factor = np.sqrt(factor)
-                if factor < 1.02:
-                    raise self._failure("while the surface rates were raised", LAST_STEP)
         finally:
             surface.constant = true
+
+    def _finish(self) -> bool:
+        """Converge at the true rates; False when that stalls."""
         worst = np.inf
-        for _ in range(LAST_TRIES):
+        for attempt in range(LAST_TRIES):
             last, worst = worst, self.newton(LAST_STEP)
             self.watch(self.iterations, worst)
             if worst < CONVERGED or (worst < ROUNDING and worst > 0.5 * last):
-                self.keep()
-                return
-        raise self._failure("at the true surface rates", LAST_STEP)
+                return True
+            if attempt >= TRIES and worst > SETTLED:
+                return False
+        return False
 
     def settle_accounts(self) -> None:
         """Hand the state to the reactor's transport and bed, solve the species that are only made, and book one second of it."""
