@@ -2,6 +2,7 @@
 
     python scripts/dem_table.py -o DIR [--rows sine_105 ...] [--stiffness 3 30 300] [--seeds 1 2 3]
     python scripts/dem_table.py -o DIR --markdown
+    python scripts/dem_table.py -o DIR --write docs/dem.md
 
 Each run leaves DIR/<row>_k<stiffness>_s<seed>.json and is not repeated; a killed run continues from its last
 whole cycle. Runs go one after the other, cheapest stiffness first.
@@ -43,6 +44,7 @@ SIXTEEN = {"kind": "sine", "frequency": "16 Hz", "angle": "60 deg", "angle_from"
 SAWTOOTH = {"kind": "sawtooth", "gamma": 10.273 / 9.81, "frequency": "48 Hz", "angle": "45 deg"}
 AIR = {"velocity": "0 cm/s"}
 
+MARKS = ("<!-- table of scripts/dem_table.py -->", "<!-- end of the table -->")
 Row = tuple[str, str, dict[str, Any]]  # what it is, the seed's value in cm/s, the powder file
 
 
@@ -163,9 +165,18 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="*", type=int, default=[1, 2, 3])
     parser.add_argument("--cycles", type=int, default=8, help="per run, the first three are not averaged")
     parser.add_argument("--markdown", action="store_true", help="print the table of what is there")
+    parser.add_argument(
+        "--write", type=Path, metavar="DOC", help="put the table between the marks of this document"
+    )
     options = parser.parse_args()
     if options.markdown:
         print(markdown(options.output))
+        return
+    if options.write:
+        before, _, rest = options.write.read_text().partition(MARKS[0])
+        after = rest.partition(MARKS[1])[2]
+        table = f"{MARKS[0]}\n{markdown(options.output)}\n{MARKS[1]}"
+        write_atomically(options.write, before + table + after)
         return
     options.output.mkdir(parents=True, exist_ok=True)
     for stiffness in options.stiffness:

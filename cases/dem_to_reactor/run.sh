@@ -8,7 +8,5 @@ python=${PYTHON:-python}
 mkdir -p "$out"
 
 "$python" -m mpm dem "$here/powder.toml" -o "$out/dem" --overwrite
-# The reactor's case names the profile relative to itself, so it runs beside a copy of it.
-cp "$out/dem/profile_scaled.csv" "$out/"
-sed "s|\.\./\.\./meshes|$here/../../meshes|" "$here/reactor.toml" > "$out/reactor.toml"
-"$python" -m mpm run "$out/reactor.toml" -o "$out/reactor" --overwrite
+profile=$(cd "$out/dem" && pwd)/profile_scaled.csv
+"$python" -m mpm run "$here/reactor.toml" -o "$out/reactor" --overwrite --set "motion.profile=$profile"
