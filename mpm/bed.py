@@ -34,19 +34,25 @@ class Bed:
         layers = case.geometry.layers
         names = case.mechanism.site_names
         reactive = [
-            row for row, i in enumerate(grid.row_layer) if layers[i].material and layers[i].material.surface_to_volume > 0.0
+            row
+            for row, i in enumerate(grid.row_layer)
+            if layers[i].material and layers[i].material.surface_to_volume > 0.0
         ]
         self.rows = np.asarray(reactive, dtype=np.int64)
         self.columns = grid.columns
         solids = [layers[grid.row_layer[row]].material for row in reactive]
         moving = np.array([layers[grid.row_layer[row]].moving for row in reactive], dtype=bool)
         self.moving_rows = np.flatnonzero(moving)
-        self.fresh = np.array([[s.initial_coverage.get(k, 0.0) for s in solids] for k in names]).reshape(len(names), -1)
+        self.fresh = np.array([[s.initial_coverage.get(k, 0.0) for s in solids] for k in names]).reshape(
+            len(names), -1
+        )
         place_of_row = np.full(grid.rows, -1)
         place_of_row[self.rows] = np.arange(len(self.rows))
         self.cells = np.flatnonzero(place_of_row[strip.row[: strip.owned]] >= 0)
         self.place = place_of_row[strip.row[self.cells]]  # index into `rows`
-        self.scatter = Scatter(strip.comm, self.place * grid.columns + strip.column[self.cells], len(self.rows) * grid.columns)
+        self.scatter = Scatter(
+            strip.comm, self.place * grid.columns + strip.column[self.cells], len(self.rows) * grid.columns
+        )
         surface = np.array([s.surface_to_volume for s in solids])
         density = np.array([s.site_density for s in solids])
         self.surface, self.sites = surface[self.place], density[self.place]
@@ -67,7 +73,7 @@ class Bed:
     def advance(self, distance: float) -> int:
         """Slide the bed by `distance` [m] relative to the mesh; returns the number of whole columns it moved. Collective."""
         self.distance += distance
-        target = int(np.floor(self.distance / self.dx + 0.5))
+        target = int(np.floor(self.distance / self.dx + 0.5 - TIE))
         count = target - self.shifted
         if count and len(self.moving_rows):
             whole = self.whole()
@@ -107,4 +113,5 @@ class Bed:
         return self.theta @ self.capacity
 
 
+TIE = 1e-6  # of a column: half a column, reached by rounding from either side, is always not yet enough
 MEMORY = 64  # columns remembered beyond each end; the bed swings back by a few at most

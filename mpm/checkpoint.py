@@ -65,14 +65,22 @@ def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
 
 
 SUMMED = ("fed", "out", "back", "out_volume", "back_volume")
-BEFORE = ("out", "out_volume", "back_volume", "surface", "slid")  # of the latest output, for what is reported since then
+BEFORE = (
+    "out",
+    "out_volume",
+    "back_volume",
+    "surface",
+    "slid",
+)  # of the latest output, for what is reported since then
 
 
 def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
     """Put `reactor`, freshly built for the same case, into the stored state; collective."""
     transport, bed, strip = reactor.transport, reactor.bed, reactor.strip
     if tuple(meta["species"]) != transport.names:
-        raise InputError(f"the restart state follows {', '.join(meta['species'])}; the case {', '.join(transport.names)}")
+        raise InputError(
+            f"the restart state follows {', '.join(meta['species'])}; the case {', '.join(transport.names)}"
+        )
     ledger = transport.ledger
     transport.concentration = strip.scatter.to_local(arrays["concentration"])
     ledger.gas_events = strip.scatter.to_local(arrays["gas_events"])

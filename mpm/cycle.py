@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.errors import ConvergenceError
-from mpm.fem import PETSc
 from mpm.flow import FlowProblem
 from mpm.motion import REST, BedMotion, StepMotion, step_motion
 from mpm.parallel import largest
-from mpm.solvers import check
 
 Floats = NDArray[np.float64]
 NEWTON_LIMIT = 25
@@ -88,7 +86,8 @@ def periodic_flow(
     Marches from the steady flow under the mean forcing. Summed over a periodic cycle of backward Euler the storage cancels, so the
     cycle's mean satisfies the steady equations with the cycle's mean convection. What it lacks after a cycle is the slow start-up drift
     of the headspace (about 0.7 s): a Newton step on those equations removes it at once, where marching would take 100 cycles.
-    Periodicity is judged on velocities alone. `watch(cycle, change)` is called after every cycle. Raises ConvergenceError after CYCLE_LIMIT cycles.
+    Periodicity is judged on velocities alone. `watch(cycle, change)` is called after every cycle. Raises ConvergenceError after
+    CYCLE_LIMIT cycles.
     """
     motions = cycle_motions(bed, problem.dt, phases)
     steady_flow(problem, mean_motion(bed))
@@ -123,7 +122,9 @@ def periodic_flow(
         problem.newton_update(residual)
         problem.state.x.array[:] += last - state_mean
         convective_mean.destroy()
-    raise ConvergenceError(f"periodic flow: velocities still change by {change:.3g} per cycle after {CYCLE_LIMIT} cycles")
+    raise ConvergenceError(
+        f"periodic flow: velocities still change by {change:.3g} per cycle after {CYCLE_LIMIT} cycles"
+    )
 
 
 def _change(problem: FlowProblem, previous: list[Floats], fields: list[FlowField]) -> float:

@@ -78,7 +78,9 @@ def species_balances(case: Case, totals: Totals) -> dict[str, dict[str, float]]:
     result = {}
     for name in mechanism.species_names:
         if name not in totals.names:
-            result[name] = dict.fromkeys(("fed", "left", "reacted", "stored", "produced", "balance_error"), 0.0)
+            result[name] = dict.fromkeys(
+                ("fed", "left", "reacted", "stored", "produced", "balance_error"), 0.0
+            )
             continue
         i = totals.names.index(name)
         made = used = 0.0
@@ -142,7 +144,14 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
     """
     mechanism = case.mechanism
     errors = {}
-    elements = sorted({e for part in (mechanism.species, mechanism.sites, mechanism.films) for p in part for e in p.elements})
+    elements = sorted(
+        {
+            e
+            for part in (mechanism.species, mechanism.sites, mechanism.films)
+            for p in part
+            for e in p.elements
+        }
+    )
     for element in elements:
         terms = []
         for i, name in enumerate(totals.names):
@@ -160,7 +169,10 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
             ]
         atoms_of_film = {film.name: film.elements.get(element, 0.0) for film in mechanism.films}
         terms += [-atoms_of_film[name] * amount for name, amount in film_made(case, totals).items()]
-        on_solids = sum(s.elements.get(element, 0.0) * n for s, n in zip(mechanism.sites, totals.sites_initially, strict=True))
+        on_solids = sum(
+            s.elements.get(element, 0.0) * n
+            for s, n in zip(mechanism.sites, totals.sites_initially, strict=True)
+        )
         scale = max(FLOOR * float(on_solids), *(abs(t) for t in terms))
         errors[element] = abs(sum(terms)) / scale if scale else 0.0
     return errors
@@ -177,7 +189,9 @@ def film_made(case: Case, totals: Totals) -> dict[str, float]:
 
 def dosed_species(case: Case, inlet: Inlet) -> str | None:
     """The species an inlet doses that has a half-reaction, or None."""
-    return next((n for n, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reaction(n)), None)
+    return next(
+        (n for n, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reaction(n)), None
+    )
 
 
 def zone_of(case: Case, inlet: Inlet) -> Zone | None:
@@ -201,7 +215,9 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
         species, zone = dosed_species(case, inlet), zone_of(case, inlet)
         if species is None or zone is None:
             continue
-        site = case.mechanism.half_reaction(species).product_site
+        reaction = case.mechanism.half_reaction(species)
+        assert reaction is not None  # dosed_species gives only such
+        site = reaction.product_site
         theta = state.theta[case.mechanism.site_names.index(site)][inside]
         box = grid.columns_between(zone.start, inlet.center)
         last = np.flatnonzero(grid.columns_between(zone.start, zone.end))[-1]
@@ -243,7 +259,9 @@ def utilisation(case: Case, grid: Grid, totals: Totals) -> dict[str, float]:
     return result
 
 
-def outlet_fractions(case: Case, totals: Totals, before: Totals | None) -> dict[str, dict[str, dict[str, float]]]:
+def outlet_fractions(
+    case: Case, totals: Totals, before: Totals | None
+) -> dict[str, dict[str, dict[str, float]]]:
     """Flux-weighted mole fractions of what left each outlet since `before` (the previous output; None: since the start).
 
     Amount of the species over amount of gas (volume times p/(R T)); the carrier by difference. Gas drawn back in does not count.
@@ -277,7 +295,8 @@ def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:
     result: dict[str, Any] = {"rate_mean": whole / area, "rate_max": state.cvd_max}
     if whole > 0.0:
         result["share_in_zone"] = {
-            zone.name: float(state.cvd[number] / whole) for number, zone in enumerate(case.geometry.zones, start=1)
+            zone.name: float(state.cvd[number] / whole)
+            for number, zone in enumerate(case.geometry.zones, start=1)
         }
     return result
 

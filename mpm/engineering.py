@@ -13,6 +13,7 @@ from mpm.chemistry import inlet_concentrations
 from mpm.geometry import Grid
 from mpm.layout import Inlet
 from mpm.materials import Material
+from mpm.schedule import Schedule
 
 MEMORY_OF_A_RANK = 0.15e9
 """Interpreter, PETSc and MPI before there is a mesh [bytes]."""
@@ -173,15 +174,8 @@ def flow_courant(case: Case, grid: Grid) -> float:
 
 
 def expected_steps(case: Case) -> int:
-    """Time steps of a run: `step` in averaged, `steps_per_cycle` from the start of the vibration in resolved, 0 in steady."""
-    time, motion = case.time, case.motion
-    if case.fidelity == "steady":
-        return 0
-    if case.fidelity == "averaged":
-        return math.ceil(time.end / time.step * (1.0 - 1e-12))
-    rate = motion.frequency * time.steps_per_cycle
-    before = min(motion.start, time.end)
-    return sum(math.ceil(span * rate * (1.0 - 1e-12)) for span in (before, time.end - before))
+    """Time steps of a run (`mpm.schedule`); 0 in steady."""
+    return 0 if case.fidelity == "steady" else Schedule.from_case(case).steps
 
 
 def expected_memory(case: Case, cells: int, ranks: int = 1) -> float:

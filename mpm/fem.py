@@ -7,16 +7,15 @@ The PyPI wheel `dolfinx-solver-real` must be imported as `dolfinx_solver` before
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 
 from mpm.errors import MpmError
 
 # PETSc would take SIGTERM and SIGPIPE away from Python
 os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler".strip()
 
-try:
+with suppress(ModuleNotFoundError):
     import dolfinx_solver  # noqa: F401
-except ModuleNotFoundError:
-    pass
 
 try:
     import dolfinx.fem.petsc

@@ -21,7 +21,7 @@ from mpm.parallel import any_rank
 from mpm.strip import Strip
 
 if TYPE_CHECKING:
-    from mpm.case import Case, Inlet
+    from mpm.case import Case, Inlet, Outlet
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -64,7 +64,9 @@ def face_conductance(strip: Strip, along_x: Floats, along_y: Floats) -> Floats:
 
     def half(cells: Ints) -> Floats:
         """Conductance from the cell's centre to the face."""
-        across = np.where(faces.vertical_flow, along_y[cells] / strip.height[cells], along_x[cells] / strip.grid.dx)
+        across = np.where(
+            faces.vertical_flow, along_y[cells] / strip.height[cells], along_x[cells] / strip.grid.dx
+        )
         return 2.0 * across
 
     one, two = half(faces.behind), half(faces.ahead)
@@ -104,7 +106,9 @@ class FluxOperator:
 class FluxAssembler:
     """Builds flux operators of one diffusivity [m2/s] for many velocity fields."""
 
-    def __init__(self, case: Case, strip: Strip, diffusivity: float, dispersion: tuple[Floats, Floats] | None = None):
+    def __init__(
+        self, case: Case, strip: Strip, diffusivity: float, dispersion: tuple[Floats, Floats] | None = None
+    ):
         self.case, self.strip = case, strip
         self.along_x, self.along_y = effective_diffusivity(case, strip, diffusivity)
         if dispersion is not None:
@@ -141,7 +145,7 @@ class FluxAssembler:
         into, out = exponential_flux(volume_in / area, conductance)
         return PortFlux(cells, out * area, into * area, area, np.maximum(-volume_in, 0.0))
 
-    def _outlet(self, outlet, flow: FaceFlow) -> PortFlux:
+    def _outlet(self, outlet: Outlet, flow: FaceFlow) -> PortFlux:
         cells, columns, inward = self._wall(outlet.side, flow)
         mine = np.flatnonzero(self.strip.grid.opening(outlet)[columns])
         volume_in = inward[mine] * self.strip.grid.dx

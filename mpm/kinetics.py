@@ -13,17 +13,20 @@ concentration (a Newton iterate) leaves Q as it is at zero and enters r_r linear
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpm.chemistry import GasReaction, SurfaceReaction
+
 if TYPE_CHECKING:
     from mpm.chemistry import Mechanism
 
 Floats = NDArray[np.float64]
+Reaction = SurfaceReaction | GasReaction
 
 
 @dataclass(frozen=True)
@@ -41,30 +44,31 @@ class Roles:
     def of(cls, mechanism: Mechanism, fed: set[str]) -> Roles:
         """Species that can appear when `fed` enter: a reaction runs once all its gas reactants are present."""
         present = set(fed)
+        reactions: list[Reaction] = [*mechanism.surface_reactions, *mechanism.gas_reactions]
         while True:
             made = {
                 name
-                for reaction in (*mechanism.surface_reactions, *mechanism.gas_reactions)
+                for reaction in reactions
                 if reactants(reaction) <= present
                 for name in stoichiometry(reaction)
             }
             if made <= present:
                 break
             present |= made
-        running = [r for r in (*mechanism.surface_reactions, *mechanism.gas_reactions) if reactants(r) <= present]
+        running = [r for r in reactions if reactants(r) <= present]
         reacting = {name for reaction in running for name in reactants(reaction)}
         order = [name for name in mechanism.species_names if name in present]
         return cls(tuple(n for n in order if n in reacting), tuple(n for n in order if n not in reacting))
 
 
-def reactants(reaction) -> set[str]:
+def reactants(reaction: Reaction) -> set[str]:
     """Gas species whose concentrations set the rate of a surface or gas reaction."""
-    return {reaction.gas} if hasattr(reaction, "gas") else set(reaction.reactants)
+    return {reaction.gas} if isinstance(reaction, SurfaceReaction) else set(reaction.reactants)
 
 
-def stoichiometry(reaction) -> dict[str, float]:
+def stoichiometry(reaction: Reaction) -> Mapping[str, float]:
     """Signed gas stoichiometry of a surface or gas reaction, per event."""
-    return reaction.nu_gas if hasattr(reaction, "nu_gas") else reaction.nu
+    return reaction.nu_gas if isinstance(reaction, SurfaceReaction) else reaction.nu
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +88,14 @@ class Exposure:
 class SurfaceKinetics:
     """Surface reactions in `n` cells with area `surface` S [1/m] and `sites` n_s [mol/m2], temperature [K] scalar or per cell."""
 
-    def __init__(self, mechanism: Mechanism, coupled: tuple[str, ...], surface: Floats, sites: Floats, temperature: ArrayLike):
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        coupled: tuple[str, ...],
+        surface: Floats,
+        sites: Floats,
+        temperature: ArrayLike,
+    ):
         self.coupled, self.surface, self.sites = coupled, surface, sites
         names = mechanism.site_names
         self.reactions = [r for r in mechanism.surface_reactions if r.gas in coupled]
@@ -92,8 +103,12 @@ class SurfaceKinetics:
         self.site = [names.index(r.site) for r in self.reactions]
         molar_mass = {s.name: s.molar_mass for s in mechanism.species}
         t = np.broadcast_to(np.asarray(temperature, dtype=float), surface.shape)
-        self.constant = [np.asarray(r.rate_constant(t, molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions]
-        self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(-1, len(names))
+        self.constant = [
+            np.asarray(r.rate_constant(t, molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions
+        ]
+        self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
+            -1, len(names)
+        )
         self.nu_gas = np.array([[r.nu_gas.get(k, 0.0) for k in coupled] for r in self.reactions]).reshape(
             len(self.reactions), len(coupled)
         )
@@ -167,7 +182,9 @@ class SurfaceKinetics:
             out = mean = np.einsum("ksn,sn->kn", inverse, theta)
             out_q = mean_q = span * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, out[self.site])
             out_theta = mean_theta = inverse
-        values = np.stack([self.constant[r] * concentration[g] * mean[s] for r, (g, s) in enumerate(self._pairs())])
+        values = np.stack(
+            [self.constant[r] * concentration[g] * mean[s] for r, (g, s) in enumerate(self._pairs())]
+        )
         slopes = np.zeros((count, *concentration.shape))
         out_c = np.zeros((k, *concentration.shape))
         values_theta = np.zeros((count, *theta.shape))
@@ -270,12 +287,20 @@ def phi1(x: Floats) -> Floats:
 
 def phi2(x: Floats) -> Floats:
     """(1 - phi1(x)) / x for x >= 0."""
-    return _series(x, lambda v: (1.0 + np.expm1(-v) / v) / v, (1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0, 1.0 / 720.0))
+    return _series(
+        x,
+        lambda v: (1.0 + np.expm1(-v) / v) / v,
+        (1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0, 1.0 / 720.0),
+    )
 
 
 def dphi1(x: Floats) -> Floats:
     """Derivative of phi1."""
-    return _series(x, lambda v: (np.exp(-v) + np.expm1(-v) / v) / v, (-1.0 / 2.0, 1.0 / 3.0, -1.0 / 8.0, 1.0 / 30.0, -1.0 / 144.0))
+    return _series(
+        x,
+        lambda v: (np.exp(-v) + np.expm1(-v) / v) / v,
+        (-1.0 / 2.0, 1.0 / 3.0, -1.0 / 8.0, 1.0 / 30.0, -1.0 / 144.0),
+    )
 
 
 def dphi2(x: Floats) -> Floats:

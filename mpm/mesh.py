@@ -6,11 +6,12 @@ facet it covers, wholly or in part (the share itself is `Grid.overlap`). Meshing
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from mpm.case import Case
 
 LINE, QUADRILATERAL = 1, 3  # gmsh's element types
+Blocks = list[tuple[str, NDArray[np.int64]]]
+Lines = dict[str, NDArray[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,8 @@ def build_mesh(case: Case, path: Path | None = None) -> QuadMesh:
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         points = np.zeros((int(tags.max()) + 1, 2))
         points[tags.astype(np.int64)] = coordinates.reshape(-1, 3)[:, :2]
-        blocks, lines = [], {}
+        blocks: Blocks = []
+        lines: Lines = {}
         for dim, tag in gmsh.model.getPhysicalGroups():
             name = gmsh.model.getPhysicalName(dim, tag)
             entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
@@ -87,7 +91,8 @@ def read_msh(case: Case, path: Path) -> QuadMesh:
         raw = meshio.gmsh.read(path)  # meshio.read ends the whole program when it fails
     except (meshio.ReadError, ValueError, IndexError, KeyError) as error:
         raise InputError(f"{path}: not a readable gmsh file ({error})") from error
-    blocks, lines = [], {}
+    blocks: Blocks = []
+    lines: Lines = {}
     for name, per_block in raw.cell_sets.items():
         for block, members in zip(raw.cells, per_block, strict=True):
             if members is None or not len(members) or name.startswith("gmsh:"):
@@ -114,19 +119,24 @@ def _gmsh_model(title: str) -> Iterator:
         gmsh.finalize()
 
 
-def _draw(gmsh, case: Case, grid: Grid) -> None:
+def _draw(gmsh: Any, case: Case, grid: Grid) -> None:
     """Rectangles, transfinite curves and surfaces, physical groups."""
     geo = gmsh.model.geo
     layers = case.geometry.layers
     edges = [float(grid.y[grid.layer_rows(name).start]) for name in grid.layer_names] + [float(grid.y[-1])]
     ports = [*case.geometry.inlets, *case.geometry.outlets]
-    levels, groups = [], {}
+    levels = []
+    groups: dict[str, list[int]] = {}
     for level, y in enumerate(edges):
         side = {0: "bottom", len(layers): "top"}.get(level)
         spans = {
-            port.name: np.flatnonzero(grid.overlap(port) > 0.0) for port in ports if side and port.side == side
+            port.name: np.flatnonzero(grid.overlap(port) > 0.0)
+            for port in ports
+            if side and port.side == side
         }
-        breaks = sorted({0, grid.columns, *(int(c[0]) for c in spans.values()), *(int(c[-1]) + 1 for c in spans.values())})
+        breaks = sorted(
+            {0, grid.columns, *(int(c[0]) for c in spans.values()), *(int(c[-1]) + 1 for c in spans.values())}
+        )
         points = [geo.addPoint(float(grid.x[b]), y, 0.0) for b in breaks]
         curves = []
         for (first, last), (a, b) in zip(_pairs(breaks), _pairs(points), strict=True):
@@ -149,7 +159,9 @@ def _draw(gmsh, case: Case, grid: Grid) -> None:
             sides[name].append(curve)
         loop = geo.addCurveLoop([*below[1], right, *(-c for c in reversed(above[1])), -left])
         surface = geo.addPlaneSurface([loop])
-        geo.mesh.setTransfiniteSurface(surface, "Left", [below[0][0], below[0][-1], above[0][-1], above[0][0]])
+        geo.mesh.setTransfiniteSurface(
+            surface, "Left", [below[0][0], below[0][-1], above[0][-1], above[0][0]]
+        )
         geo.mesh.setRecombine(2, surface)
         surfaces[layer.name] = surface
     geo.synchronize()
@@ -160,10 +172,10 @@ def _draw(gmsh, case: Case, grid: Grid) -> None:
 
 
 def _pairs(items: list) -> list[tuple]:
-    return list(zip(items[:-1], items[1:], strict=True))
+    return list(itertools.pairwise(items))
 
 
-def _element_nodes(gmsh, dim: int, entity: int, kind: int) -> NDArray[np.int64]:
+def _element_nodes(gmsh: Any, dim: int, entity: int, kind: int) -> NDArray[np.int64]:
     types, _, nodes = gmsh.model.mesh.getElements(dim, entity)
     if list(types) != [kind]:
         raise InputError(f"gmsh made elements of type {list(types)} where only type {kind} was asked for")
@@ -173,8 +185,8 @@ def _element_nodes(gmsh, dim: int, entity: int, kind: int) -> NDArray[np.int64]:
 def _in_grid_order(
     grid: Grid,
     points: NDArray[np.float64],
-    blocks: list[tuple[str, NDArray[np.int64]]],
-    lines: dict[str, NDArray[np.int64]],
+    blocks: Blocks,
+    lines: Lines,
 ) -> QuadMesh:
     """Sort cells and corners into the grid's numbering and check them against the grid's edges."""
     names = grid.layer_names

@@ -7,6 +7,8 @@ is given as a mean over a time step, so that sums over a cycle are exact whateve
 
 from __future__ import annotations
 
+import csv
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,7 +42,9 @@ class Vibration:
         omega = TURN * motion.frequency
         ay = motion.gamma * GRAVITY / omega**2
         slope = np.tan(motion.angle)
-        return cls(float(ay / slope if motion.angle_from == "horizontal" else ay * slope), float(ay), float(omega))
+        return cls(
+            float(ay / slope if motion.angle_from == "horizontal" else ay * slope), float(ay), float(omega)
+        )
 
     @property
     def period(self) -> float:
@@ -121,18 +125,25 @@ class BedMotion:
             if motion.profile == "thesis":
                 liftoff, contact = thesis_phases(self.vibration, motion.liftoff_velocity)
             else:
+                assert motion.liftoff_phase is not None and motion.contact_phase is not None
                 liftoff, contact = motion.liftoff_phase, motion.contact_phase
-            self.flight = Flight(liftoff, contact, flight_velocity(self.vibration, liftoff, contact, self.mean))
+            self.flight = Flight(
+                liftoff, contact, flight_velocity(self.vibration, liftoff, contact, self.mean)
+            )
         else:
             phase, velocity = read_profile(Path(motion.profile))
-            distance = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(phase) * (velocity[1:] + velocity[:-1]))])
+            distance = np.concatenate(
+                [[0.0], np.cumsum(0.5 * np.diff(phase) * (velocity[1:] + velocity[:-1]))]
+            )
             self._table = (phase, velocity, distance / self.vibration.omega)
             self.mean = float(distance[-1] / TURN)
 
     @property
     def moving(self) -> bool:
         """False when the bed never leaves the reactor's frame."""
-        return self.vibration.ax != 0.0 and (self.flight is not None or self._table is not None) or self.mean != 0.0
+        return (
+            self.vibration.ax != 0.0 and (self.flight is not None or self._table is not None)
+        ) or self.mean != 0.0
 
     def at(self, t: float) -> float:
         """Distance the bed has slid relative to the reactor since the vibration started, s(t) with s(0) = 0 [m]."""
@@ -149,14 +160,18 @@ class BedMotion:
         if self._table is not None:
             phases, velocities, distances = self._table
             i = min(int(np.searchsorted(phases, phase, side="right")) - 1, len(phases) - 2)
-            v = velocities[i] + (velocities[i + 1] - velocities[i]) * (phase - phases[i]) / (phases[i + 1] - phases[i])
-            return float(distances[i] + 0.5 * (velocities[i] + v) * (phase - phases[i]) / self.vibration.omega)
+            v = velocities[i] + (velocities[i + 1] - velocities[i]) * (phase - phases[i]) / (
+                phases[i + 1] - phases[i]
+            )
+            return float(
+                distances[i] + 0.5 * (velocities[i] + v) * (phase - phases[i]) / self.vibration.omega
+            )
         assert self.flight is not None
         flight = self.flight
         # walk through the intervals of one turn that starts at phase 0
         edges = sorted({0.0, flight.liftoff, flight.contact, phase})
         distance = 0.0
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in itertools.pairwise(edges):
             if b > phase:
                 break
             middle = 0.5 * (a + b)
@@ -211,10 +226,12 @@ def read_profile(path: Path) -> tuple[Floats, Floats]:
 
     The first point is repeated one turn later, so that linear interpolation closes the cycle.
     """
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"]
-    table = np.genfromtxt(lines, delimiter=",", names=True, comments=None, deletechars="", replace_space="_")
-    phase = np.radians(np.atleast_1d(table["phase_deg"]))
-    velocity = np.atleast_1d(table["u_x_m/s"])
+    lines = [
+        line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"
+    ]
+    table = list(csv.DictReader(lines, skipinitialspace=True))
+    phase = np.radians([float(row["phase_deg"]) for row in table])
+    velocity = np.array([float(row["u_x_m/s"]) for row in table])
     inside = (phase >= 0.0) & (phase < TURN * (1.0 - 1e-12))
     phase, velocity = phase[inside], velocity[inside]
     order = np.argsort(phase)

@@ -1,4 +1,7 @@
-"""What a run says about itself: its log, and the live line with simulated time, steps per second, time left, worst balance. Only rank 0 prints."""
+"""What a run says about itself: its log, and the live line of simulated time, steps per second, time left and worst balance.
+
+Only rank 0 prints.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
+from rich.status import Status
 
 from mpm.parallel import is_root
 
@@ -40,8 +44,9 @@ class Progress:
         self.shown = shown and is_root(reactor.comm)
         self.console = Console(stderr=True)
         self.interval = 0.2 if self.console.is_terminal else 10.0
-        self.status = None
-        self.begun, self.first, self.printed = clock.monotonic(), None, clock.monotonic()
+        self.status: Status | None = None
+        self.first: tuple[float, int] | None = None
+        self.printed = clock.monotonic()
 
     def __enter__(self) -> Self:
         if self.shown and self.console.is_terminal:
@@ -49,7 +54,9 @@ class Progress:
             self.status.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self.shown:
             self._print(force=True)
         if self.status is not None:

@@ -1,16 +1,14 @@
 """The reactor: puts mesh, motion, flow, bed and transport together and marches them in time.
 
-    result = Reactor(load_case("single_zone")).run("results/zone")
-    result.summary["titration"]["tma"]["exit_mean"]
+result = Reactor(load_case("single_zone")).run("results/zone")
+result.summary["titration"]["tma"]["exit_mean"]
 """
 
 from __future__ import annotations
 
 import logging
-import signal
 import time as clock
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +26,7 @@ from mpm.parallel import is_root, largest, on_root, total
 from mpm.progress import Progress, log_file
 from mpm.replay import March, Replay
 from mpm.schedule import Schedule, Step
+from mpm.signals import stop_signals
 from mpm.steady import SteadyProblem
 from mpm.strip import Strip
 from mpm.summary import history_row, summarise
@@ -96,8 +95,14 @@ class Reactor:
         begun = clock.monotonic()
         directory = self._open(output, resume, overwrite)
         file = directory.log if directory is not None and is_root(self.comm) else None
-        with log_file(log, file), Progress(self, progress) as bar, self._signals():
-            log.info("%s: %s, %d cells, %d ranks", self.case.title, self.case.fidelity, self.grid.cells, self.comm.size)
+        with log_file(log, file), Progress(self, progress) as bar, stop_signals(self._request_stop):
+            log.info(
+                "%s: %s, %d cells, %d ranks",
+                self.case.title,
+                self.case.fidelity,
+                self.grid.cells,
+                self.comm.size,
+            )
             if self.case.fidelity == "steady":
                 return self._run_steady(directory, callback, bar, begun)
             try:
@@ -160,7 +165,9 @@ class Reactor:
             self.flows = Replay.solve(self.case, self.strip, self.motion, self.schedule, watch)
         self.flows.register(self.transport)
 
-    def _run_steady(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress, begun: float) -> Result:
+    def _run_steady(
+        self, directory: RunDirectory | None, callback: Callback | None, bar: Progress, begun: float
+    ) -> Result:
         """Find the quasi-steady state; the last iterate is written when that fails."""
 
         def watch(iteration: int, residual: float) -> None:
@@ -221,26 +228,12 @@ class Reactor:
 
     def _check_stop(self) -> None:
         if largest(self.comm, [self._stop])[0] > 0.0:
-            raise Interrupted("interrupted while the flow was being found; nothing but the case has been written")
+            raise Interrupted(
+                "interrupted while the flow was being found; nothing but the case has been written"
+            )
 
-    @contextmanager
-    def _signals(self) -> Iterator[None]:
-        """Turn SIGINT and SIGTERM into a stop after the step in hand."""
-
-        def stop(number: int, frame: object) -> None:
-            self._stop = True
-
-        previous = {}
-        try:
-            for number in (signal.SIGINT, signal.SIGTERM):
-                previous[number] = signal.signal(number, stop)
-        except ValueError:  # not the main thread: the caller handles signals
-            pass
-        try:
-            yield
-        finally:
-            for number, handler in previous.items():
-                signal.signal(number, handler)
+    def _request_stop(self) -> None:
+        self._stop = True
 
     # --- writing ---
 
@@ -380,7 +373,9 @@ class Reactor:
             both = self.strip.scatter.to_all(np.stack([local["velocity_x"], local["velocity_y"]]))
             return np.moveaxis(both.reshape(2, *shape), 0, -1)
         if name not in local:
-            raise InputError(f"no field {name!r}; there are velocity, {', '.join(n for n in local if 'velocity' not in n)}")
+            raise InputError(
+                f"no field {name!r}; there are velocity, {', '.join(n for n in local if 'velocity' not in n)}"
+            )
         return self.strip.scatter.to_all(local[name]).reshape(shape)
 
     def coverage(self, layer: str, site: str) -> Floats:

@@ -29,7 +29,12 @@ class Replay:
 
     @classmethod
     def solve(
-        cls, case: Case, strip: Strip, bed: BedMotion, schedule: Schedule, watch: Callable[[int, float], None] | None
+        cls,
+        case: Case,
+        strip: Strip,
+        bed: BedMotion,
+        schedule: Schedule,
+        watch: Callable[[int, float], None] | None,
     ) -> Replay:
         """Find the fields of a developed run: the resolved cycle, or the steady flow under its mean forcing (alone where the
         fidelity is steady)."""
@@ -72,9 +77,9 @@ class March:
     def __init__(self, case: Case, strip: Strip, bed: BedMotion, schedule: Schedule):
         self.strip, self.bed, self.schedule = strip, bed, schedule
         self.problem = FlowProblem(case, strip, schedule.dt)
-        resting = schedule.step(0) if schedule.resting_steps else None
-        same = resting is None or abs(resting.dt - schedule.dt) < 1e-12 * schedule.dt
-        self.resting = self.problem if same else FlowProblem(case, strip, resting.dt)
+        resting = schedule.step(0).dt
+        same = abs(resting - schedule.dt) < 1e-12 * schedule.dt
+        self.resting = self.problem if same else FlowProblem(case, strip, resting)
         self.current = FlowField.of(self.problem)
         self.recent: list[FlowField] = []
         self.done = 0  # steps marched
@@ -90,7 +95,11 @@ class March:
             problem.step(step_motion(self.bed, step.since, step.since + step.dt))
             self.current = FlowField.of(problem)
             self.done += 1
-            self.recent = [*self.recent[1 - self.schedule.phases :], self.current] if self.schedule.phases > 1 else [self.current]
+            self.recent = (
+                [*self.recent[1 - self.schedule.phases :], self.current]
+                if self.schedule.phases > 1
+                else [self.current]
+            )
         transport.replace_flow(0, face_flow(self.strip, self.current.velocities))
         return 0
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import ceil, floor
 from typing import TYPE_CHECKING
 
+from mpm.motion import BedMotion
+
 if TYPE_CHECKING:
     from mpm.case import Case
 
@@ -32,6 +34,20 @@ class Step:
         return self.t1 - self.t0
 
 
+def aligned_step(step: float, column: float, speed: float) -> float:
+    """The longest step up to `step` [s] that fits the bed's shifts: a whole number of steps per column, or of columns per step.
+
+    Every column then meets the gas of a cell for equally long; otherwise some would stay a step longer than their neighbours, and
+    the coverage would come out in stripes. A shift takes `column` / `speed` [m, m/s].
+    """
+    if speed <= 0.0:
+        return step
+    shift = column / speed
+    if shift >= step:
+        return shift / ceil(shift / step - SLACK)
+    return shift * floor(step / shift + SLACK)
+
+
 @dataclass(frozen=True)
 class Schedule:
     """Equal steps of `dt` [s] from the start of the vibration on, `phases` of them per cycle (1: every step is alike).
@@ -51,7 +67,9 @@ class Schedule:
             n = case.time.steps_per_cycle
             phases = n if case.motion.gamma > 0.0 else 1
             return cls(1.0 / case.motion.frequency / n, phases, case.motion.start, case.time.end)
-        return cls(case.time.step, 1, case.motion.start, case.time.end)
+        column = case.geometry.length / case.geometry.columns
+        step = aligned_step(case.time.step, column, BedMotion(case.motion).mean)
+        return cls(step, 1, case.motion.start, case.time.end)
 
     @property
     def resting_steps(self) -> int:
@@ -73,7 +91,9 @@ class Schedule:
             dt = self.start / rest
             return Step(index, index * dt, (index + 1) * dt, RESTING, index * dt - self.start)
         k = index - rest
-        return Step(index, self.start + k * self.dt, self.start + (k + 1) * self.dt, k % self.phases, k * self.dt)
+        return Step(
+            index, self.start + k * self.dt, self.start + (k + 1) * self.dt, k % self.phases, k * self.dt
+        )
 
     def from_step(self, index: int) -> Iterator[Step]:
         """All steps from `index` on."""

@@ -24,7 +24,9 @@ class DirectSolver:
         pc.setType("lu")
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
-        pc.getFactorMatrix().setMumpsIcntl(14, 60)  # per cent of spare workspace: the saddle point pivots a lot
+        pc.getFactorMatrix().setMumpsIcntl(
+            14, 60
+        )  # per cent of spare workspace: the saddle point pivots a lot
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve for one right-hand side. Raises ConvergenceError when the factor or the solution is not usable."""
@@ -50,7 +52,9 @@ class KrylovSolver:
         else:
             pc.setType("bjacobi")  # its default block solver is ILU(0)
 
-    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None, guess: bool = False) -> int:
+    def solve(
+        self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None, guess: bool = False
+    ) -> int:
         """Solve to the relative `tolerance`; returns the number of iterations. Raises ConvergenceError."""
         if tolerance is not None:
             self.ksp.rtol = tolerance

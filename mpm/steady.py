@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.cellmatrix import CellMatrix
 from mpm.errors import ConvergenceError
 from mpm.fem import PETSc
 from mpm.parallel import largest, total
 from mpm.solvers import DirectSolver
-from mpm.transport import CellMatrix, stays_open
+from mpm.transport import stays_open
 
 if TYPE_CHECKING:
     from mpm.reactor import Reactor
@@ -31,7 +32,10 @@ Floats = NDArray[np.float64]
 SOFT = 1e-4  # factor on the surface rate constants with which the continuation starts: fronts as wide as some cells
 FIRST_STEP, LAST_STEP = 1.0, 1e12  # s, pseudo-time steps; a storage term over the last one is below rounding
 SETTLED = 0.05  # residual over feed at which the continuation goes on
-CONVERGED, ROUNDING = 1e-11, 1e-10  # of the largest feed: sum of |residual|; the second is accepted when nothing improves any more
+CONVERGED, ROUNDING = (
+    1e-11,
+    1e-10,
+)  # of the largest feed: sum of |residual|; the second is accepted when nothing improves any more
 TRIES, LAST_TRIES = 12, 60  # Newton iterations per stage and for the last one
 FINEST = 1.03  # smallest factor of the continuation
 SHORTEST = 1.0 / 64.0  # of a Newton step, in the line search
@@ -40,7 +44,12 @@ SHORTEST = 1.0 / 64.0  # of a Newton step, in the line search
 class SteadyProblem:
     """Residual and Jacobian of the quasi-steady system on the flow field `number` of the reactor's transport."""
 
-    def __init__(self, reactor: Reactor, number: int, watch: Callable[[int, float], None] = lambda iteration, residual: None):
+    def __init__(
+        self,
+        reactor: Reactor,
+        number: int,
+        watch: Callable[[int, float], None] = lambda iteration, residual: None,
+    ):
         self.watch = watch
         self.transport, self.bed, self.strip = reactor.transport, reactor.bed, reactor.strip
         transport, bed, strip = self.transport, self.bed, self.strip
@@ -49,7 +58,9 @@ class SteadyProblem:
         self.free = self.kinds - 1  # independent coverages of a moving cell
         velocity = reactor.motion.mean
         moving_rows = set(bed.moving_rows) if velocity > 0.0 else set()
-        self.is_moving = np.array([place in moving_rows for place in bed.place], dtype=bool).reshape(len(bed.cells))
+        self.is_moving = np.array([place in moving_rows for place in bed.place], dtype=bool).reshape(
+            len(bed.cells)
+        )
         self.moving, self.resting = np.flatnonzero(self.is_moving), np.flatnonzero(~self.is_moving)
         self.residence = strip.grid.dx / velocity if velocity > 0.0 else np.inf
         self.periodic = bed.periodic
@@ -106,7 +117,9 @@ class SteadyProblem:
         # moving cells: the storage of a pseudo-time step is one more stream of sites, of age `step`
         span = 1.0 / (1.0 / step + 1.0 / self.residence)
         entering = span / self.residence * self.incoming() + span / step * old_theta[:, self.moving]
-        at_rest = transport.surface.part(self.resting).rates(c[:, cells[self.resting]], old_theta[:, self.resting], step)
+        at_rest = transport.surface.part(self.resting).rates(
+            c[:, cells[self.resting]], old_theta[:, self.resting], step
+        )
         conveyed = transport.surface.part(self.moving).conveyed(c[:, cells[self.moving]], entering, span)
         rates = np.zeros((len(transport.surface.reactions), len(cells)))
         rates[:, self.resting], rates[:, self.moving] = at_rest[0], conveyed.rates
@@ -131,18 +144,28 @@ class SteadyProblem:
         nu = transport.nu_surface[:, :b]
         blocks = np.zeros((self.own, b, b))
         if len(transport.gas.reactions):
-            blocks -= np.einsum("ri,rjn->nij", transport.nu_gas[:, :b], parts["gas_slopes"]) * transport.gas_volume[:, None, None]
+            blocks -= (
+                np.einsum("ri,rjn->nij", transport.nu_gas[:, :b], parts["gas_slopes"])
+                * transport.gas_volume[:, None, None]
+            )
         slopes = np.zeros((len(transport.surface.reactions), b, len(cells)))
-        slopes[:, :, self.resting], slopes[:, :, self.moving] = parts["rest_slopes"], parts["conveyed"].rates_c
+        slopes[:, :, self.resting], slopes[:, :, self.moving] = (
+            parts["rest_slopes"],
+            parts["conveyed"].rates_c,
+        )
         blocks[cells] -= np.einsum("ri,rjn->nij", nu, slopes) * area[:, None, None]
         for i in range(b):
             blocks[:, i, i] += self.diagonal[i] + transport.gas_volume / step
         conveyed, share = parts["conveyed"], parts["share"]
         last = self.kinds - 1
-        by_theta = (conveyed.rates_theta[:, :last] - conveyed.rates_theta[:, last:]) * share  # (reactions, free, moving)
+        by_theta = (
+            conveyed.rates_theta[:, :last] - conveyed.rates_theta[:, last:]
+        ) * share  # (reactions, free, moving)
         gas_theta = -np.einsum("ri,rkn->nik", nu, by_theta) * area[self.moving][:, None, None]
         theta_c = -np.moveaxis(conveyed.out_c[:free], -1, 0)  # (moving, free, b)
-        theta_theta = -np.moveaxis((conveyed.out_theta[:free, :last] - conveyed.out_theta[:free, last:]) * share, -1, 0)
+        theta_theta = -np.moveaxis(
+            (conveyed.out_theta[:free, :last] - conveyed.out_theta[:free, last:]) * share, -1, 0
+        )
         linked = self.upstream >= 0
         values = [
             self.cells.values[: self.cells.count],
@@ -342,12 +365,16 @@ class SteadyProblem:
         share = span / self.residence
         part = surface.part(self.moving)
         c = self.concentration[:, chosen]
-        columns = [part.conveyed(c, np.repeat(e[:, None], len(self.moving), axis=1), span).out for e in np.eye(k)]
+        columns = [
+            part.conveyed(c, np.repeat(e[:, None], len(self.moving), axis=1), span).out for e in np.eye(k)
+        ]
         local = np.zeros((k * k + k, len(bed.cells)))
         local[: k * k, self.moving] = np.concatenate(columns)  # column by column
         local[k * k :, self.moving] = self.old[1][:, self.moving]
         whole = bed.scatter.to_all(local).reshape(-1, len(bed.rows), bed.columns)[:, bed.moving_rows]
-        m = np.moveaxis(whole[: k * k].reshape(k, k, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0))  # (columns, rows, out, in)
+        m = np.moveaxis(
+            whole[: k * k].reshape(k, k, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0)
+        )  # (columns, rows, out, in)
         aged = (1.0 - share) * np.moveaxis(whole[k * k :], (0, 1, 2), (2, 1, 0))  # (columns, rows, sites)
         incoming = bed.fresh[:, bed.moving_rows].T
         if self.periodic:
@@ -363,7 +390,11 @@ class SteadyProblem:
 
     def size(self, gas: Floats, coverage: Floats) -> float:
         """Sum of |gas residual| plus that of the coverage in sites per second, over the largest feed."""
-        sites = np.abs(coverage) @ self.bed.capacity[self.moving] / self.residence if len(self.moving) else np.zeros(1)
+        sites = (
+            np.abs(coverage) @ self.bed.capacity[self.moving] / self.residence
+            if len(self.moving)
+            else np.zeros(1)
+        )
         parts = total(self.strip.comm, [np.abs(gas).sum(), sites.sum()])
         return float(parts.sum() / max(self.transport.feed_rate, 1e-300))
 

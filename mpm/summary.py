@@ -49,7 +49,9 @@ def summarise(reactor: Reactor, status: str, wall: float) -> dict[str, Any]:
         "versions": versions(),
         "species": species_balances(case, totals),
         "sites": {"balance_error": site_balance(case, totals)},
-        "elements": {name: {"balance_error": error} for name, error in element_balances(case, totals).items()},
+        "elements": {
+            name: {"balance_error": error} for name, error in element_balances(case, totals).items()
+        },
         "excess_number": {name: e[1] for name, e in excess.items()},
         "dose_ratio": {name: e[2] for name, e in excess.items()},
         "titration": titration(case, grid, state),
@@ -74,10 +76,13 @@ def history_row(
     tree: dict[str, Any] = {
         "time": time,
         "titration": {
-            name: {k: v for k, v in entry.items() if k != "exit_profile"} for name, entry in titration(case, grid, state).items()
+            name: {k: v for k, v in entry.items() if k != "exit_profile"}
+            for name, entry in titration(case, grid, state).items()
         },
         "utilisation": utilisation(case, grid, totals),
-        "outlets": {name: entry | drawn[name] for name, entry in outlet_fractions(case, totals, before).items()},
+        "outlets": {
+            name: entry | drawn[name] for name, entry in outlet_fractions(case, totals, before).items()
+        },
         "cvd": cvd(case, grid, state) | cvd_totals(case, totals),
         "front": fronts(case, grid, state),
         "contamination": contamination(case, grid, totals, state),

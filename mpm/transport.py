@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.bed import Bed
+from mpm.cellmatrix import CellMatrix, StepMatrix
 from mpm.chemistry import inlet_concentrations
 from mpm.errors import ConvergenceError
-from mpm.fem import PETSc
 from mpm.flow import FaceFlow
 from mpm.fluxes import FluxAssembler, FluxOperator
 from mpm.kinetics import GasKinetics, Roles, SurfaceKinetics
@@ -37,54 +37,6 @@ UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only
 FORCING = (1e-2, 1e-4)  # inner tolerance of the inexact Newton iteration: while the front settles, and after
 SETTLED = 3e-2  # residual below which Newton converges quadratically
 HALVINGS = 6
-
-
-class CellMatrix:
-    """A PETSc matrix over own cells with `b` unknowns per cell: face fluxes off the diagonal, dense blocks on it."""
-
-    def __init__(self, strip: Strip, b: int):
-        faces, own = strip.faces, strip.owned
-        number = strip.global_cell
-        self.b, self.own = b, own
-        self.from_behind, self.from_ahead = np.flatnonzero(faces.behind < own), np.flatnonzero(faces.ahead < own)
-        rows_behind, rows_ahead = faces.behind[self.from_behind], faces.ahead[self.from_ahead]
-        to_ahead, to_behind = faces.ahead[self.from_behind], faces.behind[self.from_ahead]
-        i, j = np.divmod(np.arange(b * b), b)
-        block_rows = (number[:own, None] * b + i).ravel()
-        block_columns = (number[:own, None] * b + j).ravel()
-        rows = [number[rows_behind] * b + k for k in range(b)] + [number[rows_ahead] * b + k for k in range(b)]
-        columns = [number[to_ahead] * b + k for k in range(b)] + [number[to_behind] * b + k for k in range(b)]
-        self.matrix = PETSc.Mat().create(strip.comm)
-        self.matrix.setSizes(((own * b, None), (own * b, None)))
-        self.matrix.setType("aij")
-        self.matrix.setPreallocationCOO(
-            np.concatenate([*rows, block_rows]).astype(PETSc.IntType),
-            np.concatenate([*columns, block_columns]).astype(PETSc.IntType),
-        )
-        self.count = b * (len(rows_behind) + len(rows_ahead))
-        self.values = np.zeros(self.count + own * b * b)
-        self._diagonal_faces = (rows_behind, rows_ahead)
-
-    def set_fluxes(self, operators: list[FluxOperator]) -> Floats:
-        """Enter the face fluxes of one operator per unknown; returns what they add to the diagonal, (b, own) [m2/s]."""
-        behind, ahead = self.from_behind, self.from_ahead
-        diagonals = {}
-        for op in operators:
-            if id(op) not in diagonals:
-                diagonal = np.bincount(self._diagonal_faces[0], op.a[behind], self.own)
-                diagonal += np.bincount(self._diagonal_faces[1], op.b[ahead], self.own)
-                for port in (*op.inlets.values(), *op.outlets.values()):
-                    np.add.at(diagonal, port.cells, port.out)
-                diagonals[id(op)] = diagonal
-        self.values[: self.count] = np.concatenate(
-            [-op.b[behind] for op in operators] + [-op.a[ahead] for op in operators]
-        )
-        return np.stack([diagonals[id(op)] for op in operators])
-
-    def assemble(self, blocks: Floats) -> None:
-        """Set the diagonal blocks (own, b, b) and assemble."""
-        self.values[self.count :] = blocks.ravel()
-        self.matrix.setValuesCOO(self.values)
 
 
 @dataclass
@@ -116,7 +68,8 @@ class Transport:
         self.case, self.strip, self.bed = case, strip, bed
         mechanism = case.mechanism
         self.feed = {
-            inlet.name: inlet_concentrations(mechanism, case.gas, inlet.mass_fractions) for inlet in case.geometry.inlets
+            inlet.name: inlet_concentrations(mechanism, case.gas, inlet.mass_fractions)
+            for inlet in case.geometry.inlets
         }
         fed = {name for amounts in self.feed.values() for name, c in amounts.items() if c > 0.0}
         self.roles = Roles.of(mechanism, fed)
@@ -126,7 +79,9 @@ class Transport:
         self.gas = GasKinetics(mechanism, self.roles.coupled, temperature)
         self._stoichiometry()
         own = strip.owned
-        porosity = [m.porosity if (m := case.geometry.layers[i].material) else 1.0 for i in strip.grid.row_layer]
+        porosity = [
+            m.porosity if (m := case.geometry.layers[i].material) else 1.0 for i in strip.grid.row_layer
+        ]
         self.porosity = np.asarray(porosity)[strip.row[:own]]
         self.volume = strip.volume[:own]
         self.gas_volume = self.porosity * self.volume
@@ -145,16 +100,23 @@ class Transport:
         )
         self.largest_feed = max((c for f in self.feed.values() for c in f.values()), default=0.0)
         diffusivities = [case.gas.diffusivity[name] for name in self.names]
-        exchange = max(diffusivities, default=0.0) / float(strip.grid.y[-1] - strip.grid.y[0])  # of an inlet that only diffuses
+        exchange = max(diffusivities, default=0.0) / float(
+            strip.grid.y[-1] - strip.grid.y[0]
+        )  # of an inlet that only diffuses
         self.feed_rate = max(
-            ((i.velocity + exchange) * i.width * max(self.feed[i.name].values(), default=0.0) for i in case.geometry.inlets),
+            (
+                (i.velocity + exchange) * i.width * max(self.feed[i.name].values(), default=0.0)
+                for i in case.geometry.inlets
+            ),
             default=0.0,
         )
         self._distinct = sorted(set(diffusivities))
         self._group = [self._distinct.index(d) for d in diffusivities]
         self._assemblers = [FluxAssembler(case, strip, d, dispersion) for d in self._distinct]
         self._flows: list[list[FluxOperator]] = []
-        self._linear = [_StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s") for d in self._distinct]
+        self._linear = [
+            StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s") for d in self._distinct
+        ]
         if self.roles.coupled:
             self._jacobian = CellMatrix(strip, len(self.roles.coupled))
             self._newton = KrylovSolver(self._jacobian.matrix, "reacting species", FORCING[0])
@@ -203,7 +165,7 @@ class Transport:
 
     def solve_steady(self, i: int, operator: FluxOperator, supply: Floats) -> Floats:
         """Concentration of species `i` without storage under `supply` [mol/m/s], by a direct solver."""
-        matrix = _StepMatrix(self.strip, self.gas_volume, self.names[i])
+        matrix = StepMatrix(self.strip, self.gas_volume, self.names[i])
         matrix.update(operator, np.inf)
         matrix.y.array[:] = supply
         DirectSolver(matrix.cells.matrix, f"steady {self.names[i]}").solve(matrix.y, matrix.x)
@@ -242,7 +204,9 @@ class Transport:
         new = old.copy()
         theta = self.bed.theta
         if coupled:
-            new[:coupled], rates, gas_rates = self._solve_coupled(number, dt, old[:coupled], supply[:coupled], theta)
+            new[:coupled], rates, gas_rates = self._solve_coupled(
+                number, dt, old[:coupled], supply[:coupled], theta
+            )
             self.bed.theta = self.surface.coverage(new[:coupled][:, self.bed.cells], theta, dt)
         else:
             rates = np.zeros((len(self.surface.reactions), len(self.bed.cells)))
@@ -282,10 +246,10 @@ class Transport:
         sums = []
         for port in operator.outlets.values():
             sums.append([*(concentration[:, port.cells] @ port.area), port.area.sum()])
-        sums = total(self.strip.comm, sums)
-        return {name: row[:-1] / row[-1] for name, row in zip(operator.outlets, sums, strict=True)}
+        rows = total(self.strip.comm, sums)
+        return {name: row[:-1] / row[-1] for name, row in zip(operator.outlets, rows, strict=True)}
 
-    def _matrix(self, group: int, number: int, dt: float) -> _StepMatrix:
+    def _matrix(self, group: int, number: int, dt: float) -> StepMatrix:
         """The linear operator gas_volume/dt + fluxes of a species group, up to date for this flow and step."""
         linear = self._linear[group]
         if linear.key != (number, dt):
@@ -315,7 +279,9 @@ class Transport:
         for _iteration in range(NEWTON_LIMIT):
             rates, slopes = self.surface.rates(new[:, cells], theta, dt)
             gas_rates, gas_slopes = self.gas.rates(new)
-            source = (self.nu_gas[:, :b].T @ gas_rates) * self.gas_volume if len(gas_rates) else np.zeros_like(new)
+            source = (
+                (self.nu_gas[:, :b].T @ gas_rates) * self.gas_volume if len(gas_rates) else np.zeros_like(new)
+            )
             source[:, cells] += (self.nu_surface[:, :b].T @ rates) * self.active_area
             residual = np.stack([m.multiply(c) for m, c in zip(matrices, new, strict=True)]) - rhs - source
             worst = total(self.strip.comm, [np.abs(residual).sum()])[0] / scale
@@ -326,8 +292,12 @@ class Transport:
                 break
             blocks = np.zeros((own, b, b))
             if len(gas_rates):
-                blocks -= np.einsum("ri,rjn->nij", self.nu_gas[:, :b], gas_slopes) * self.gas_volume[:, None, None]
-            blocks[cells] -= np.einsum("ri,rjn->nij", self.nu_surface[:, :b], slopes) * self.active_area[:, None, None]
+                blocks -= (
+                    np.einsum("ri,rjn->nij", self.nu_gas[:, :b], gas_slopes) * self.gas_volume[:, None, None]
+                )
+            blocks[cells] -= (
+                np.einsum("ri,rjn->nij", self.nu_surface[:, :b], slopes) * self.active_area[:, None, None]
+            )
             for i in range(b):
                 blocks[:, i, i] += diagonal[i]
             self._jacobian.assemble(blocks)
@@ -366,36 +336,6 @@ class Transport:
             for k, port in enumerate(operators[0].outlets.values()):
                 ledger.out_volume[k] += dt * port.volume_out.sum()
                 ledger.back_volume[k] += dt * port.into.sum()
-
-
-class _StepMatrix:
-    """gas_volume/dt + fluxes for one species, with the solvers that go with it."""
-
-    def __init__(self, strip: Strip, gas_volume: Floats, name: str):
-        self.cells = CellMatrix(strip, 1)
-        self.gas_volume, self.name = gas_volume, name
-        self.key: tuple[int, float] | None = None
-        self.krylov: KrylovSolver | None = None
-        self.x, self.y = self.cells.matrix.createVecs()
-
-    def update(self, operator: FluxOperator, dt: float) -> None:
-        diagonal = self.cells.set_fluxes([operator])[0] + self.gas_volume / dt
-        self.cells.assemble(diagonal)
-
-    def multiply(self, values: Floats) -> Floats:
-        self.x.array[:] = values
-        self.cells.matrix.mult(self.x, self.y)
-        return self.y.array.copy()
-
-    def solve(self, rhs: Floats, guess: Floats, residual: float) -> Floats:
-        """BiCGStab from `guess` until the residual norm is below `residual` [mol/m/s]."""
-        if self.krylov is None:
-            self.krylov = KrylovSolver(self.cells.matrix, self.name, 0.0)
-            self.krylov.ksp.setTolerances(rtol=1e-13, atol=residual / np.sqrt(max(self.cells.matrix.size[0], 1)))
-        self.y.array[:] = rhs
-        self.x.array[:] = guess
-        self.krylov.solve(self.y, self.x, guess=True)
-        return self.x.array.copy()
 
 
 def open_share(inlet: Inlet, t0: float, t1: float) -> float:
