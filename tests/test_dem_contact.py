@@ -129,6 +129,22 @@ def test_sliding_goes_over_into_rolling(tmp_path):
     assert end.spin[0, 1] * D / 2 == pytest.approx(end.velocity[0, 0], rel=0.01)
 
 
+@pytest.mark.parametrize("e", [0.9, 0.6])
+def test_bouncing_particle_reaches_the_hard_sphere_heights(tmp_path, e):
+    """Rebound heights fall by e^2 each time (the reference's dem02.csv): 0.424 and 0.362 of 0.5 with e 0.9, radius 0.1."""
+    g, drop = 981.0, 8 * D
+    with make(tmp_path, [[5 * D, 5 * D, D / 2 + drop]], stiffness=3e4, steps=200.0, wall_restitution=e) as box:
+        box.accelerate(0.0, -g)
+        fall = math.sqrt(2 * drop / g)
+        box.run(int(1.02 * fall / box.timestep))
+        for bounce in (1, 2):
+            peak = 0.0
+            for _ in range(50):
+                box.run(int(2 * e**bounce * fall / 50 / box.timestep))
+                peak = max(peak, box.snapshot().position[0, 2] - D / 2)
+            assert peak == pytest.approx(drop * e ** (2 * bounce), rel=0.01)
+
+
 def test_stacked_pair_overlaps_as_springs(tmp_path):
     """Two particles at rest on the base: overlaps 2 m g/k at the wall and m g/k between them."""
     g, k = 9.81, 3.0
