@@ -12,7 +12,7 @@ SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
 
 def test_a_killed_driver_loses_nothing_and_leaves_nothing(bench):
     """SIGKILL of the driver. Fails when a point goes on computing, or a finished or started one begins anew."""
-    bench.delay = 1.0
+    bench.delay = 1.5
     bench.sweep("[0.1, 0.2, 0.3, 0.4, 0.5]")
     driver = bench.start()
     bench.wait_for(lambda: len(bench.events("start")) == 4 and len(bench.events("step")) > 45)
