@@ -1,0 +1,161 @@
+"""`make bench`: cells, steps, seconds per step of the flow and of the species, memory, on 1 and 2 ranks.
+
+A report, not a test. Every row is a run of its own in processes of its own; `--full` simulates the whole 20 s instead of extrapolating
+from the first part. Times are wall clock, so an otherwise idle machine matters.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+ROOT = Path(__file__).resolve().parent.parent
+THESIS_ROWS = {"plenum": 20, "frit": 12, "bed": 20, "headspace": 69}  # with 0.34 mm columns: 49,731 cells
+
+
+def worker(fidelity: str, seconds: float) -> None:
+    """Run one row under MPI and print its numbers as JSON on rank 0."""
+    import resource
+    import time
+
+    from mpm import Reactor, load_case
+    from mpm.cycle import mean_motion
+    from mpm.flow import FlowProblem
+    from mpm.motion import REST
+    from mpm.parallel import largest, total
+
+    changes: dict[str, object] = {f"geometry.layer.{name}.cells": n for name, n in THESIS_ROWS.items()}
+    changes |= {
+        "fidelity": fidelity,
+        "time.end": f"{seconds} s",
+        "output.every": f"{max(seconds / 20, 0.25)} s",
+    }
+    case = load_case(ROOT / "cases" / "single_zone.toml", changes)
+    reactor = Reactor(case)
+    spent = {"flow": 0.0, "reacting": 0.0, "products": 0.0}
+    watched = {
+        "flow": (reactor, "_start"),
+        "reacting": (reactor.transport, "_solve_coupled"),
+        "products": (reactor.transport, "_solve_linear"),
+    }
+    for key, (owner, name) in watched.items():
+        _time(owner, name, spent, key)
+    begun = time.perf_counter()
+    with tempfile.TemporaryDirectory() as directory:
+        result = reactor.run(reactor.comm.bcast(directory, root=0))
+    wall = time.perf_counter() - begun
+    problem = FlowProblem(case, reactor.strip, reactor.schedule.dt)
+    problem.settle(mean_motion(reactor.motion), problem.convective_force())
+    problem.step(REST)
+    steps = 5
+    start = time.perf_counter()
+    for _ in range(steps):
+        problem.step(REST)
+    flow_step = (time.perf_counter() - start) / steps
+    peak = total(reactor.comm, [resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0])[0]
+    wall = float(largest(reactor.comm, [wall])[0])
+    if reactor.comm.rank == 0:
+        numbers = {
+            "cells": reactor.grid.cells,
+            "steps": reactor.steps,
+            "wall": wall,
+            "flow": spent["flow"],
+            "flow_step": flow_step,
+            "reacting_step": spent["reacting"] / max(reactor.steps, 1),
+            "products_step": spent["products"] / max(reactor.steps, 1),
+            "memory": peak,
+            "balance": max(entry["balance_error"] for entry in result.summary["species"].values()),
+        }
+        print("BENCH " + json.dumps(numbers), flush=True)
+
+
+def _time(owner: object, name: str, spent: dict[str, float], key: str) -> None:
+    """Add the time of every call of `owner.name` to `spent[key]`."""
+    import time
+
+    original = getattr(owner, name)
+
+    def timed(*args: object, **kwargs: object) -> object:
+        start = time.perf_counter()
+        try:
+            return original(*args, **kwargs)
+        finally:
+            spent[key] += time.perf_counter() - start
+
+    setattr(owner, name, timed)
+
+
+def measure(fidelity: str, ranks: int, seconds: float) -> dict[str, float]:
+    """One row in processes of its own."""
+    launcher = [str(Path(sys.executable).parent / "mpirun"), "-n", str(ranks)] if ranks > 1 else []
+    if launcher and not Path(launcher[0]).exists():
+        launcher[0] = shutil.which("mpirun") or "mpirun"
+    command = [*launcher, sys.executable, __file__, "--worker", fidelity, "--seconds", str(seconds)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    lines = [line for line in done.stdout.splitlines() if line.startswith("BENCH ")]
+    if done.returncode or not lines:
+        sys.exit(f"{' '.join(command)} failed:\n{done.stderr[-2000:]}")
+    return json.loads(lines[0].removeprefix("BENCH "))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--full", action="store_true", help="simulate all 20 s")
+    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--fidelity", nargs="+", default=["averaged", "resolved", "steady"])
+    parser.add_argument("--worker", help=argparse.SUPPRESS)
+    parser.add_argument("--seconds", type=float, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.worker:
+        worker(options.worker, options.seconds)
+        return
+    table = Table(title="Single TMA zone at the thesis mesh, all species, 20 s")
+    for column in (
+        "fidelity",
+        "ranks",
+        "cells",
+        "steps",
+        "flow s",
+        "s/step flow",
+        "s/step reacting",
+        "s/step products",
+        "wall s",
+        "for 20 s",
+        "MB in all",
+        "worst balance",
+    ):
+        table.add_column(column, justify="left" if column == "fidelity" else "right")
+    for fidelity in options.fidelity:
+        for ranks in options.ranks:
+            seconds = (
+                20.0 if options.full or fidelity == "steady" else {"averaged": 4.0, "resolved": 1.0}[fidelity]
+            )
+            row = measure(fidelity, ranks, seconds)
+            whole = row["flow"] + (row["wall"] - row["flow"]) * 20.0 / seconds
+            table.add_row(
+                fidelity,
+                str(ranks),
+                f"{row['cells']:,.0f}",
+                f"{row['steps']:,.0f}",
+                f"{row['flow']:.1f}",
+                f"{row['flow_step']:.3f}",
+                f"{row['reacting_step']:.4f}",
+                f"{row['products_step']:.4f}",
+                f"{row['wall']:.1f}",
+                f"{whole:.0f}",
+                f"{row['memory'] / 1e6:.0f}",
+                f"{row['balance']:.1e}",
+            )
+    Console(width=160).print(table)
+
+
+if __name__ == "__main__":
+    main()
