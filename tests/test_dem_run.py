@@ -4,11 +4,14 @@ import json
 import math
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from mpm.cli import main
@@ -221,3 +224,24 @@ def test_waveform_command(tmp_path, capfd):
     powder.write_text('powder = "GL50"\n' + (tmp_path / "w" / "waveform.toml").read_text())
     wave = load_case(powder).build_waveform()
     assert wave.acceleration(np.array([1 / 48 / 4]))[:, 0] == pytest.approx([-5.0, -7.0], rel=1e-3)
+
+
+@pytest.mark.lammps
+def test_interrupted_run_goes_on(tiny, tmp_path):
+    """SIGINT while two seeds run side by side: status 130, no child left, and --resume ends the run."""
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "mpm", "dem", str(tiny), "-o", str(out), "-q", "-j", "2", "--set", "box.height=2"]
+    long = subprocess.Popen([*command, "--set", "run.cycles=400"], stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 120
+    while not all((out / f"seed_{s}" / "state.npz").exists() for s in (1, 2)):
+        assert time.monotonic() < deadline and long.poll() is None
+        time.sleep(0.2)
+    children = psutil.Process(long.pid).children(recursive=True)
+    long.send_signal(signal.SIGINT)
+    assert long.wait(timeout=60) == 130
+    assert "--resume" in long.stderr.read()
+    assert psutil.wait_procs(children, timeout=10)[1] == []
+    assert not (out / "summary.json").exists()
+    done = int(max(state(out, s)["cycles"] for s in (1, 2)))
+    assert main([*command[3:], "--resume", "--set", f"run.cycles={max(done, 2)}"]) == 0
+    assert json.loads((out / "summary.json").read_text())["status"] == "done"

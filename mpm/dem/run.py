@@ -203,8 +203,11 @@ def _over_ranks(case: DemCase, directory: Path, resume: bool, report: Report, wo
                 simulation.run(resume)
     except (ConvergenceError, InputError) as error:
         failure = type(error)(f"seed {seed}: {error}")
-    finally:
-        comm.Free()
+        if comm.size > 1:
+            # LAMMPS may have failed on this rank alone and left its partners in a call: the command line waits
+            # for them a while and then ends the job
+            raise failure from None
+    comm.Free()
     failures = [f for f in world.allgather(failure) if f is not None]
     if failures:
         raise failures[0]
@@ -212,7 +215,7 @@ def _over_ranks(case: DemCase, directory: Path, resume: bool, report: Report, wo
 
 def interrupted(directory: Path) -> Interrupted:
     return Interrupted(
-        f"interrupted; whole cycles are kept, go on with: mpm dem {directory / 'case.toml'} --resume"
+        f"interrupted; whole cycles are kept, go on with: mpm dem {directory / 'case.toml'} -o {directory} --resume"
     )
 
 
