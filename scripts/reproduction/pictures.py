@@ -53,7 +53,7 @@ def concentrations(lab: Lab) -> Figure:
             f"Gamma {g:.2f}, 1.3 cm/s",
             {
                 **impulsive,
-                "time.steps_per_cycle": 32,
+                "time.steps_per_cycle": 16,
                 "motion.inlet_frame": "reactor",
                 "motion.gamma": g,
                 **early,

@@ -60,7 +60,7 @@ class Lab:
     @property
     def settled(self) -> dict[str, Any]:
         """Changes that bring a case to its final state: a long averaged run."""
-        return {"time.end": "60 s" if self.coarse else "100 s", "time.step": "50 ms", "output.every": "5 s"}
+        return {"time.end": "60 s", "time.step": "50 ms", "output.every": "5 s"}
 
     def meshes(self) -> str:
         """Meshes and fidelities of the cases asked for since `used` was cleared."""
