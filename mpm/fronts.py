@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mpm.chemistry import inlet_concentrations
 from mpm.diagnostics import State, Totals, conveyed_layer, dosed_species, running_gas, running_surface
 from mpm.geometry import Grid
+from mpm.motion import BedMotion
 
 if TYPE_CHECKING:
     from mpm.case import Case, Inlet
@@ -159,8 +160,8 @@ def contamination(case: Case, grid: Grid, totals: Totals, state: State) -> dict[
     """Per zone and per precursor that this zone's own inlet does not dose: what has come over from other zones / all that has been fed.
 
     What has come over is what the zone has consumed on surfaces and in the gas, has let out through its outlets and holds now in its
-    gas. It equals what has crossed the zone's ends, since the zone holds none at first. An outlet belongs to the zone that holds its
-    centre.
+    gas. It equals what has crossed the zone's ends, since the zone holds none at first. In the steady state, where amounts are per
+    second, what it holds does not count. An outlet belongs to the zone that holds its centre.
     """
     result: dict[str, dict[str, float]] = {}
     porosity = np.array(
@@ -177,7 +178,7 @@ def contamination(case: Case, grid: Grid, totals: Totals, state: State) -> dict[
             if own is not None and own.mass_fractions.get(species, 0.0) > 0.0:
                 continue
             columns = grid.zone_of_column == number
-            amount = float(weight @ field[:, columns].sum(axis=1))
+            amount = 0.0 if case.fidelity == "steady" else float(weight @ field[:, columns].sum(axis=1))
             for index, reaction in enumerate(running_surface(case, totals.names)):
                 amount -= reaction.nu_gas.get(species, 0.0) * float(totals.surface[index][:, columns].sum())
             for index, gas in enumerate(running_gas(case, totals.names)):
@@ -213,7 +214,8 @@ def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[
     """Per solid product: `amount` [mol/m] on all surfaces since the start and, for the conveyed layer, what has grown since `before`.
 
     `per_area` [mol/m2]: what has grown in that layer over the particle surface S h s that has been conveyed meanwhile by a distance s;
-    in the developed state, growth per cycle. Over the whole surface of the layer where it does not move. `thickness` [m] =
+    in the developed state, growth per cycle. (Steady: both per second.)
+    Over the whole surface of the layer where it does not move. `thickness` [m] =
     per_area M / density, where the mechanism's film has both. Absent while nothing is conveyed.
     """
     name = conveyed_layer(case)
@@ -225,7 +227,11 @@ def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[
         inside = grid.layer_rows(name)
         rows = (totals.reactive_rows >= inside.start) & (totals.reactive_rows < inside.stop)
         assert layer.material is not None
-        length = totals.slid - (before.slid if before else 0.0) if layer.moving else grid.length
+        length = grid.length
+        if layer.moving and case.fidelity == "steady":
+            length = BedMotion(case.motion).mean
+        elif layer.moving:
+            length = totals.slid - (before.slid if before else 0.0)
         area = layer.material.surface_to_volume * layer.height * length
     for solid in case.mechanism.films:
         amount = grown = 0.0

@@ -231,7 +231,7 @@ def delay_harmless(lab: Lab) -> Finding:
     )
 
 
-RATIOS = (0.5, 1.0, 2.0)
+RATIOS = (0.5, 0.75, 1.0, 1.5, 2.0, 4.0)
 
 
 @row(
@@ -242,7 +242,7 @@ RATIOS = (0.5, 1.0, 2.0)
 )
 def cvd_map(lab: Lab) -> Finding:
     checks, numbers = Checks(), {}
-    ratios = RATIOS
+    ratios = (0.5, 1.0, 2.0) if lab.coarse else RATIOS
     for width in WIDTHS:
         base = dose_ratios(lab.case("cycle", "coarse", {**ports(width), **STOICHIOMETRIC}))
         rate, film, feed = (np.zeros((len(ratios), len(ratios))) for _ in range(3))

@@ -59,8 +59,8 @@ class Lab:
 
     @property
     def settled(self) -> dict[str, Any]:
-        """Changes that bring a case to its final state: a long averaged run."""
-        return {"time.end": "60 s", "time.step": "50 ms", "output.every": "5 s"}
+        """Changes that bring a case to its final state."""
+        return {"fidelity": "steady"}
 
     def meshes(self) -> str:
         """Meshes and fidelities of the cases asked for since `used` was cleared."""
