@@ -42,10 +42,14 @@ def zone(changes: Mapping[str, Any] | None = None, mesh: Mapping[str, Any] = COA
 
 def cycle(changes: Mapping[str, Any] | None = None, mesh: Mapping[str, Any] = COARSE) -> Case:
     """The single cycle of TMA and water on a coarse mesh: both half-reactions and the gas reaction."""
-    return load_case(CASES / "single_cycle.toml", {**mesh, "geometry.cell_width": "4.66 mm", **(changes or {})})
+    return load_case(
+        CASES / "single_cycle.toml", {**mesh, "geometry.cell_width": "4.66 mm", **(changes or {})}
+    )
 
 
-def strip_case(layers: Sequence[Mapping[str, Any]], columns: int = 3, length: float = 3e-3, **tables: Any) -> Case:
+def strip_case(
+    layers: Sequence[Mapping[str, Any]], columns: int = 3, length: float = 3e-3, **tables: Any
+) -> Case:
     """A strip of `length` [m] with these layers and no ports unless `geometry` brings them; the rest by table."""
     geometry = {
         "length": f"{length!r} m",
@@ -56,14 +60,18 @@ def strip_case(layers: Sequence[Mapping[str, Any]], columns: int = 3, length: fl
     return load_case({"geometry": geometry, "motion": {"gamma": 0.0, "bed_velocity": "0 m/s"}, **tables})
 
 
-def column_case(height: float, cells: int, velocity: float, material: Mapping[str, Any], **tables: Any) -> Case:
+def column_case(
+    height: float, cells: int, velocity: float, material: Mapping[str, Any], **tables: Any
+) -> Case:
     """Plug flow upwards: one porous layer, an inlet as wide as the strip below it and an outlet as wide above it."""
     length = 3e-3
     port = {"center": f"{0.5 * length!r} m", "width": f"{length!r} m"}
     inlet = {"name": "in", "velocity": f"{velocity!r} m/s", **port, **tables.pop("inlet", {})}
     geometry = {"inlet": [inlet], "outlet": [{"name": "out", **port}], **tables.pop("geometry", {})}
     layer = {"name": "packing", "height": f"{height!r} m", "cells": cells, "material": "packing"}
-    return strip_case([layer], length=length, geometry=geometry, material={"packing": dict(material)}, **tables)
+    return strip_case(
+        [layer], length=length, geometry=geometry, material={"packing": dict(material)}, **tables
+    )
 
 
 def assert_laws(reactor: Reactor) -> None:
@@ -80,9 +88,13 @@ def assert_laws(reactor: Reactor) -> None:
 
     transport, theta = reactor.transport, reactor.bed.theta
     lowest = -largest(comm, [-transport.concentration.min(initial=0.0)])[0]
-    assert lowest >= -1e-14 * transport.largest_feed, f"t = {reactor.time:g} s: concentration {lowest:g} mol/m3"
+    assert lowest >= -1e-14 * transport.largest_feed, (
+        f"t = {reactor.time:g} s: concentration {lowest:g} mol/m3"
+    )
     assert np.all(np.isfinite(transport.concentration))
-    assert theta.min(initial=0.0) >= 0.0 and theta.max(initial=0.0) <= 1.0, f"coverage {theta.min()} ... {theta.max()}"
+    assert theta.min(initial=0.0) >= 0.0 and theta.max(initial=0.0) <= 1.0, (
+        f"coverage {theta.min()} ... {theta.max()}"
+    )
     np.testing.assert_allclose(theta.sum(axis=0), 1.0, rtol=0.0, atol=1e-11)
 
     assert reactor.flows is not None
@@ -117,7 +129,16 @@ def norm(error: Any, weights: Any = None) -> float:
     return float(np.sqrt(np.average(np.square(error), weights=weights)))
 
 
-BOOKKEEPING = {"ranks", "wall_seconds", "versions", "status", "title", "fidelity", "balance_error", "mass_error"}
+BOOKKEEPING = {
+    "ranks",
+    "wall_seconds",
+    "versions",
+    "status",
+    "title",
+    "fidelity",
+    "balance_error",
+    "mass_error",
+}
 
 
 def physical_numbers(summary: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
@@ -142,4 +163,6 @@ def assert_same_numbers(one: Mapping[str, Any], other: Mapping[str, Any], tolera
     amounts = [v["fed"] for v in one["species"].values()]
     for name, value in a.items():
         floor = 1e-6 * max(amounts) if name.startswith("species.") else 1e-9
-        assert abs(value - b[name]) <= tolerance * max(abs(value), abs(b[name]), floor), f"{name}: {value!r}, {b[name]!r}"
+        assert abs(value - b[name]) <= tolerance * max(abs(value), abs(b[name]), floor), (
+            f"{name}: {value!r}, {b[name]!r}"
+        )

@@ -32,7 +32,7 @@ def moving(bed: Bed) -> np.ndarray:
 @pytest.mark.parallel
 @pytest.mark.parametrize("inflow", ["fresh", "periodic"])
 def test_swinging_back_restores_everything(inflow: str) -> None:
-    """Fails when solids that slid out at either end and came back are replaced by fresh ones, or the count of passed sites keeps a trace."""
+    """Fails when solids that slid out at either end and came back are replaced by fresh ones, or the count of what passed keeps a trace."""
     bed = marked({"geometry.bed_inflow": inflow})
     before = moving(bed)
     for there, back in ((3.2, -3.2), (-2.7, 2.7), (5.0, -9.0), (4.0, 0.0)):
@@ -56,7 +56,9 @@ def test_fresh_solids_enter_on_either_side() -> None:
         else:
             np.testing.assert_array_equal(after[:, :-2], before[:, 2:])
             assert (after[:, -2:] == 1.0).all()
-        np.testing.assert_array_equal(np.delete(bed.whole()[0], bed.moving_rows, axis=0), frit)  # the frit stays
+        np.testing.assert_array_equal(
+            np.delete(bed.whole()[0], bed.moving_rows, axis=0), frit
+        )  # the frit stays
 
 
 @pytest.mark.parallel
@@ -92,7 +94,8 @@ def test_position_error_is_below_half_a_column() -> None:
 @pytest.mark.parallel
 @pytest.mark.parametrize("gamma", [0.0, 0.3])
 def test_a_step_is_carried_once_around_exactly(gamma: float) -> None:
-    """Fails when carrying a coverage step around the periodic strip smears, shifts or loses it: after one turn it must be bit for bit the same.
+    """Fails when carrying a coverage step around the periodic strip smears, shifts or loses it: after one turn it must be the
+    same, bit for bit.
 
     With vibration the bed swings forwards and backwards within each cycle; a bed speed that covers the length in 430 cycles.
     """
@@ -100,7 +103,9 @@ def test_a_step_is_carried_once_around_exactly(gamma: float) -> None:
     length = bed.columns * bed.dx
     cycles = 430
     speed = length * 16.0 / cycles
-    case = zone({"motion.gamma": gamma, "motion.bed_velocity": f"{speed!r} m/s", "motion.frequency": "16 Hz"}, TINY)
+    case = zone(
+        {"motion.gamma": gamma, "motion.bed_velocity": f"{speed!r} m/s", "motion.frequency": "16 Hz"}, TINY
+    )
     motion = BedMotion(case.motion)
     step = np.zeros((len(bed.rows), bed.columns))
     step[:, bed.columns // 3 : bed.columns // 2] = 1.0

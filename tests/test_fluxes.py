@@ -19,7 +19,9 @@ D = 2.88e-5
 def uniform_flow(strip: Strip, ux: float, uy: float) -> FaceFlow:
     """The same velocity on every face, walls included."""
     inner = np.where(strip.faces.vertical_flow, uy, ux)
-    return FaceFlow(inner, np.full(len(strip.wall_cells("bottom")), uy), np.full(len(strip.wall_cells("top")), uy))
+    return FaceFlow(
+        inner, np.full(len(strip.wall_cells("bottom")), uy), np.full(len(strip.wall_cells("top")), uy)
+    )
 
 
 def net_outflow(strip: Strip, op: FluxOperator, c: np.ndarray) -> np.ndarray:
@@ -109,7 +111,9 @@ def test_operator_is_an_m_matrix(diffusivity: float) -> None:
     net = net_outflow(strip, op, np.full(strip.grid.cells, 2.0))
     np.testing.assert_allclose(net, 0.0, atol=1e-15 * max(op.a.max(), 1e-30))
     c = np.random.default_rng(1).uniform(0.0, 1.0, strip.grid.cells)
-    assert abs(net_outflow(strip, op, c).sum()) < 1e-14 * op.a.max() * len(c)  # what leaves one cell enters another
+    assert abs(net_outflow(strip, op, c).sum()) < 1e-14 * op.a.max() * len(
+        c
+    )  # what leaves one cell enters another
 
 
 def port_flow(case: Any, strip: Strip) -> FaceFlow:
@@ -155,7 +159,9 @@ def test_inlet_diffusion_adds_the_half_cell() -> None:
 
 def test_inlet_at_rest_in_the_lab_still_passes_what_the_frame_pumps() -> None:
     """Fails when an inlet of zero velocity loses the flow that the moving frame drives through it: gas would not balance."""
-    case = zone({"geometry.inlet.purge.velocity": "0 m/s", "motion.inlet_frame": "lab", "fidelity": "resolved"})
+    case = zone(
+        {"geometry.inlet.purge.velocity": "0 m/s", "motion.inlet_frame": "lab", "fidelity": "resolved"}
+    )
     strip = Strip(case, MPI.COMM_SELF)
     flow = port_flow(case, strip)
     columns = strip.column[strip.wall_cells("bottom")]

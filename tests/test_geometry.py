@@ -19,7 +19,9 @@ def test_columns_are_equal_and_fill_the_length() -> None:
         grid = Grid.from_case(zone({"geometry.cell_width": width}))
         assert grid.columns == columns
         np.testing.assert_allclose(np.diff(grid.x), 139.7e-3 / columns, rtol=1e-12)
-        assert grid.x[-1] == pytest.approx(139.7e-3, rel=1e-15) and grid.dx == pytest.approx(139.7e-3 / columns)
+        assert grid.x[-1] == pytest.approx(139.7e-3, rel=1e-15) and grid.dx == pytest.approx(
+            139.7e-3 / columns
+        )
 
 
 def test_y_is_zero_at_the_top_of_the_moving_layer(grid: Grid) -> None:
@@ -34,13 +36,16 @@ def test_y_is_zero_at_the_top_of_the_moving_layer(grid: Grid) -> None:
 
 def test_layers_zones_and_volumes(grid: Grid) -> None:
     """Fails when rows or columns are attributed to the wrong layer or zone, or cell volumes do not add up to the strip."""
-    assert [grid.layer_rows(n) for n in grid.layer_names] == [slice(0, 4), slice(4, 7), slice(7, 11), slice(11, 19)]
+    assert [grid.layer_rows(n) for n in grid.layer_names] == [
+        slice(0, 4),
+        slice(4, 7),
+        slice(7, 11),
+        slice(11, 19),
+    ]
     assert grid.volumes.sum() == pytest.approx(139.7e-3 * 22.29e-3, rel=1e-12)
     assert grid.cells == grid.rows * grid.columns == len(grid.volumes)
     assert set(grid.zone_of_column) == {1}
-    two = Grid.from_case(
-        zone({"geometry.zone.zone1.start": "70 mm", "geometry.zone.zone1.end": "120 mm"})
-    )
+    two = Grid.from_case(zone({"geometry.zone.zone1.start": "70 mm", "geometry.zone.zone1.end": "120 mm"}))
     assert np.array_equal(two.zone_of_column == 1, two.columns_between(70e-3, 120e-3))
     assert (two.zone_of_column == 0).any()
 

@@ -23,8 +23,12 @@ def alumina() -> Mechanism:
 def with_third_site(mechanism: Mechanism) -> Mechanism:
     """The same reactions among three states, the third of which nothing makes: takes the general solver."""
     return Mechanism(
-        mechanism.name, mechanism.species, (*mechanism.sites, Site("inert", {})), mechanism.films,
-        mechanism.surface_reactions, mechanism.gas_reactions,
+        mechanism.name,
+        mechanism.species,
+        (*mechanism.sites, Site("inert", {})),
+        mechanism.films,
+        mechanism.surface_reactions,
+        mechanism.gas_reactions,
     )
 
 
@@ -34,11 +38,23 @@ def ring() -> Mechanism:
 
     def reaction(gas: str, start: str, stop: str, events: float, k: float) -> SurfaceReaction:
         return SurfaceReaction(
-            key=gas, equation=f"{start} + {gas} -> {stop}", A=k, b=0.0, Ea=0.0, reference_temperature=1.0,
-            gas=gas, site=start, nu_gas={gas: -events}, nu_site={start: -events, stop: events},
+            key=gas,
+            equation=f"{start} + {gas} -> {stop}",
+            A=k,
+            b=0.0,
+            Ea=0.0,
+            reference_temperature=1.0,
+            gas=gas,
+            site=start,
+            nu_gas={gas: -events},
+            nu_site={start: -events, stop: events},
         )
 
-    reactions = (reaction("A", "x", "y", 1.0, 0.7), reaction("B", "y", "z", 2.0, 1.3), reaction("C", "z", "x", 1.0, 0.2))
+    reactions = (
+        reaction("A", "x", "y", 1.0, 0.7),
+        reaction("B", "y", "z", 2.0, 1.3),
+        reaction("C", "z", "x", 1.0, 0.2),
+    )
     return Mechanism("ring", gases, tuple(Site(s, {}) for s in "xyz"), (), reactions, ())
 
 
@@ -60,8 +76,13 @@ def test_three_sites_agree_with_the_closed_form_of_two(alumina: Mechanism, dt: f
     two, three = surface(alumina, ("TMA", "H2O")), surface(with_third_site(alumina), ("TMA", "H2O"))
     concentration, theta = random_state(2, 2)
     wide = np.vstack([theta, np.zeros(N)])
-    np.testing.assert_allclose(three.coverage(concentration, wide, dt)[:2], two.coverage(concentration, theta, dt), atol=1e-13)
-    (rates, slopes), (closed_rates, closed_slopes) = three.rates(concentration, wide, dt), two.rates(concentration, theta, dt)
+    np.testing.assert_allclose(
+        three.coverage(concentration, wide, dt)[:2], two.coverage(concentration, theta, dt), atol=1e-13
+    )
+    (rates, slopes), (closed_rates, closed_slopes) = (
+        three.rates(concentration, wide, dt),
+        two.rates(concentration, theta, dt),
+    )
     np.testing.assert_allclose(rates, closed_rates, rtol=1e-9, atol=1e-14 * closed_rates.max())
     # the slopes of the general solver lose digits with the ratio of step to site lifetime (1e10 at the longest step)
     np.testing.assert_allclose(slopes, closed_slopes, rtol=1e-5, atol=1e-12 * np.abs(closed_slopes).max())
@@ -98,7 +119,9 @@ def test_coverage_stays_between_zero_and_one(alumina: Mechanism, kind: str, dt: 
     np.testing.assert_allclose(new.sum(axis=0), 1.0, atol=1e-12)
     values, _ = kinetics.rates(concentration, theta, dt)
     turned = kinetics.nu_site.T @ values * dt / SITES
-    np.testing.assert_allclose(new - theta, turned, atol=1e-12 * max(1.0, np.abs(values).max() * dt / SITES[0]))
+    np.testing.assert_allclose(
+        new - theta, turned, atol=1e-12 * max(1.0, np.abs(values).max() * dt / SITES[0])
+    )
 
 
 def test_uptake_continues_linearly_below_zero(alumina: Mechanism) -> None:
@@ -140,18 +163,25 @@ def test_conveyed_solids(alumina: Mechanism, kind: str, time: float) -> None:
     turned = kinetics.nu_site.T @ passed.rates * time / SITES
     np.testing.assert_allclose(passed.out - theta, turned, atol=1e-12 * max(1.0, np.abs(turned).max()))
     assert passed.out.min() >= 0.0 and passed.out.max() <= 1.0 + 1e-14
-    for values, slopes, name in ((concentration, (passed.rates_c, passed.out_c), "c"), (theta, (passed.rates_theta, passed.out_theta), "theta")):
+    for values, slopes, name in (
+        (concentration, (passed.rates_c, passed.out_c), "c"),
+        (theta, (passed.rates_theta, passed.out_theta), "theta"),
+    ):
         for j in range(len(values)):
             h = 1e-6 * values[j].mean()
             ends = []
             for sign in (1.0, -1.0):
                 moved = values.copy()
                 moved[j] += sign * h
-                ends.append(kinetics.conveyed(*((moved, theta) if name == "c" else (concentration, moved)), time))
+                ends.append(
+                    kinetics.conveyed(*((moved, theta) if name == "c" else (concentration, moved)), time)
+                )
             for what, slope in zip(("rates", "out"), slopes, strict=True):
                 difference = (getattr(ends[0], what) - getattr(ends[1], what)) / (2 * h)
                 size = np.abs(getattr(passed, what)).max() / values[j].mean()
-                np.testing.assert_allclose(slope[:, j], difference, rtol=1e-4, atol=1e-6 * size, err_msg=f"{what} by {name} {j}")
+                np.testing.assert_allclose(
+                    slope[:, j], difference, rtol=1e-4, atol=1e-6 * size, err_msg=f"{what} by {name} {j}"
+                )
 
 
 def test_conveyed_solids_are_exact_for_one_reaction(alumina: Mechanism) -> None:
@@ -161,6 +191,7 @@ def test_conveyed_solids_are_exact_for_one_reaction(alumina: Mechanism) -> None:
     passed = kinetics.conveyed(np.full((1, N), c), theta, time)
     k = float(kinetics.constant[0][0])
     np.testing.assert_allclose(passed.out[1], np.exp(-2.0 * k * c * time / SITES), rtol=1e-13)
+
 
 def test_rate_constants_are_those_of_the_thesis(alumina: Mechanism) -> None:
     """Fails when A, the stoichiometry of (5-17), (5-18), (5-19) or the unit of the gas reaction is changed."""
@@ -193,7 +224,9 @@ def test_roles_follow_what_is_fed(alumina: Mechanism) -> None:
 
 def test_site_density_presets_differ_hundredfold() -> None:
     """Fails when the named site density of the chemistry is not about 100 times that of the thesis."""
-    case = load_case(CASES / "single_zone.toml", {"material.glass_beads.site_density": "one-per-24-square-angstrom"})
+    case = load_case(
+        CASES / "single_zone.toml", {"material.glass_beads.site_density": "one-per-24-square-angstrom"}
+    )
     layer = case.geometry.moving_layer
     assert layer is not None and layer.material is not None
     assert layer.material.site_density == pytest.approx(100 * 6.92e-8, rel=1e-3)

@@ -26,7 +26,9 @@ def test_gmsh_gives_the_grid() -> None:
     row, column = np.divmod(np.arange(grid.cells), grid.columns)
     corners = quads.points[quads.cells]
     np.testing.assert_allclose(corners[:, 0], np.column_stack([grid.x[column], grid.y[row]]), atol=1e-9)
-    np.testing.assert_allclose(corners[:, 3], np.column_stack([grid.x[column + 1], grid.y[row + 1]]), atol=1e-9)
+    np.testing.assert_allclose(
+        corners[:, 3], np.column_stack([grid.x[column + 1], grid.y[row + 1]]), atol=1e-9
+    )
     assert np.array_equal(quads.layer, grid.row_layer[row])
 
 
@@ -54,7 +56,7 @@ def test_msh_file_comes_back(tmp_path: Path) -> None:
 def test_mesh_files_that_cannot_be_used(tmp_path: Path) -> None:
     """Fails when a wrong suffix, a missing directory or file, junk, or the mesh of another case is accepted or ends in a traceback."""
     case = zone()
-    with pytest.raises(InputError, match="must end in .msh"):
+    with pytest.raises(InputError, match=r"must end in \.msh"):
         write_msh(case, tmp_path / "zone.vtk")
     with pytest.raises(InputError, match="no such directory"):
         write_msh(case, tmp_path / "nowhere" / "zone.msh")
@@ -95,7 +97,9 @@ def test_walls_instead_of_periodic_gas() -> None:
     """Fails when `periodic = false` still glues the ends, or misses one of their facets."""
     strip = Strip(zone({"geometry.periodic": False}), COMM)
     grid, topology = strip.grid, strip.mesh.topology
-    assert topology.index_map(1).size_global == grid.rows * (grid.columns + 1) + (grid.rows + 1) * grid.columns
+    assert (
+        topology.index_map(1).size_global == grid.rows * (grid.columns + 1) + (grid.rows + 1) * grid.columns
+    )
     assert total(COMM, [len(strip.end_facets())])[0] == 2 * grid.rows
 
 

@@ -21,7 +21,9 @@ TABLE = [
     (0.5, 1.3, 94.702525, 34.579599, 0.832992, 0.013297, 0.028169, 0.048791),
     (0.6, 1.3, 93.917425, 39.310117, 0.848313, 0.013015, 0.033803, 0.058549),
 ]
-TO_STANDARD_GRAVITY = 9.81 / 9.80665  # the code uses 9.80665 m/s2: this much more Gamma gives the table's amplitudes
+TO_STANDARD_GRAVITY = (
+    9.81 / 9.80665
+)  # the code uses 9.80665 m/s2: this much more Gamma gives the table's amplitudes
 
 
 def bed(**changes: object) -> BedMotion:
@@ -75,7 +77,9 @@ def test_position_is_the_integral_of_the_velocity(changes: dict[str, object]) ->
     breaks = [] if motion.flight is None else [motion.flight.liftoff, motion.flight.contact]
     for t in (0.21 * period, 0.87 * period, period, 2.4 * period):
         inside = [b / motion.vibration.omega + n * period for n in range(3) for b in breaks]
-        integral = quad(relative, 0.0, t, points=[b for b in inside if 0 < b < t] or None, epsabs=1e-13, limit=200)[0]
+        integral = quad(
+            relative, 0.0, t, points=[b for b in inside if 0 < b < t] or None, epsabs=1e-13, limit=200
+        )[0]
         assert motion.at(t) == pytest.approx(integral, abs=1e-11)
     for n in (1, 7, 320):
         assert motion.at(n * period) == pytest.approx(motion.mean * n * period, rel=1e-9)
@@ -114,7 +118,9 @@ def test_step_means_converge_to_the_instant() -> None:
     vibration: Vibration = motion.vibration
     expected = -vibration.ax * vibration.omega**2 * np.sin(vibration.omega * t)
     assert mean.acceleration == pytest.approx(expected, rel=1e-6)
-    assert mean.frame_velocity_y == pytest.approx(vibration.ay * vibration.omega * np.cos(vibration.omega * t), rel=1e-6)
+    assert mean.frame_velocity_y == pytest.approx(
+        vibration.ay * vibration.omega * np.cos(vibration.omega * t), rel=1e-6
+    )
 
 
 def test_nothing_moves_before_the_start() -> None:
@@ -134,10 +140,13 @@ def test_profile_from_a_file(tmp_path: Path) -> None:
     assert motion.mean == pytest.approx(0.01, rel=1e-6)  # the table's own mean, not bed_velocity
     period = motion.vibration.period
     for share in (0.1, 0.5, 0.9):
+
         def relative(t: float) -> float:
             return motion.lab_velocity(t) - motion.vibration.velocity(t)[0]
 
-        assert motion.at(share * period) == pytest.approx(quad(relative, 0.0, share * period, limit=500)[0], abs=1e-9)
+        assert motion.at(share * period) == pytest.approx(
+            quad(relative, 0.0, share * period, limit=500)[0], abs=1e-9
+        )
     assert motion.at(3 * period) == pytest.approx(3 * period * motion.mean, rel=1e-12)
     assert motion.lab_velocity(0.0) == pytest.approx(0.03, abs=2e-4)
 

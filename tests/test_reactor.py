@@ -96,7 +96,7 @@ def test_every_mode_conserves(mode: str, tmp_path: Path) -> None:
     reactor, result = run(MODES[mode](tmp_path))
     tma = result.summary["species"]["TMA"]
     assert tma["fed"] > 0.0 and tma["reacted"] > 0.0
-    assert reactor.time == pytest.approx(reactor.case.time.end, abs=0.07)
+    assert reactor.time == pytest.approx(reactor.case.time.end, abs=reactor.schedule.dt + 1e-9)
     if mode == "bed moving backwards":
         assert reactor.bed.shifted < -60 and reactor.motion.mean == pytest.approx(-0.02, rel=1e-3)
     if mode == "ports that reverse in the lab":
@@ -112,8 +112,14 @@ def test_every_mode_conserves(mode: str, tmp_path: Path) -> None:
 
 
 def test_bed_swings_backwards_within_cycles() -> None:
-    """Fails when columns that shift back and forth within each cycle lose their coverage: the swing of 1 mm passes more than one of the narrow columns."""
-    changes = {**RESOLVED, "time.end": "0.3 s", "time.steps_per_cycle": 16, "motion.gamma": 0.9, "motion.bed_velocity": "1 mm/s"}
+    """Fails when columns that shift back and forth within each cycle lose their coverage: a swing of 1 mm, narrower columns."""
+    changes = {
+        **RESOLVED,
+        "time.end": "0.3 s",
+        "time.steps_per_cycle": 16,
+        "motion.gamma": 0.9,
+        "motion.bed_velocity": "1 mm/s",
+    }
     reactor = Reactor(zone(changes, {**TINY, "geometry.cell_width": "0.7 mm"}), MPI.COMM_SELF)
     shifts: list[int] = []
     advance = reactor.bed.advance
@@ -139,7 +145,10 @@ def test_both_precursors_and_their_reaction_in_the_gas() -> None:
     # with equal diffusivities TMA + CH4 + 4/3 H2O + 2 Al(OH)3 is untouched by all three reactions: it stays what the inlets feed
     c = {n: result.field(f"C_{n}") for n in ("TMA", "CH4", "H2O", "Al(OH)3")}
     whole = c["TMA"] + c["CH4"] + 4.0 / 3.0 * c["H2O"] + 2.0 * c["Al(OH)3"]
-    feed = {n: inlet_concentrations(case.mechanism, case.gas, {n: y})[n] for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))}
+    feed = {
+        n: inlet_concentrations(case.mechanism, case.gas, {n: y})[n]
+        for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))
+    }
     assert whole.max() < max(feed["TMA"], 4.0 / 3.0 * feed["H2O"]) * (1 + 1e-9)
 
 
@@ -148,7 +157,10 @@ def test_a_combination_that_no_reaction_touches() -> None:
     changes = {"time.end": "4 s", "time.step": "20 ms", "output.every": "1 s"}
     case = cycle(changes, TINY)
     _, reacting = run(case)
-    feed = {n: inlet_concentrations(case.mechanism, case.gas, {n: y})[n] for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))}
+    feed = {
+        n: inlet_concentrations(case.mechanism, case.gas, {n: y})[n]
+        for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))
+    }
     # feed methane instead, in the same amounts of the combination: nothing reacts
     inert: dict[str, np.ndarray] = {}
     for inlet, name, weight in (("tma", "TMA", 1.0), ("water", "H2O", 4.0 / 3.0)):
@@ -188,14 +200,20 @@ def test_averaged_agrees_with_resolved() -> None:
         means[fidelity] = np.array(
             [result.coverage("bed", "OAl(CH3)2").mean(), result.summary["titration"]["tma"]["box_mean"]]
         )
-    assert 0.2 < means["averaged"].min() and means["averaged"].max() < 0.95  # neither fresh nor done: the comparison says something
+    assert (
+        means["averaged"].min() > 0.2 and means["averaged"].max() < 0.95
+    )  # neither fresh nor done: the comparison says something
     np.testing.assert_allclose(means["averaged"], means["resolved"], rtol=0.0, atol=0.02)
 
 
 @pytest.mark.parametrize(("mass_fraction", "untitrated"), [(1e-4, True), (1e-3, False)])
 def test_top_of_the_bed_at_the_exit(mass_fraction: float, untitrated: bool) -> None:
     """Fails when Y = 1e-4 (0.896 molecules per site) does not leave a thin untitrated top layer at the exit, or 1e-3 (8.96) leaves one."""
-    changes = {"geometry.inlet.tma.mass_fractions.TMA": mass_fraction, "output.every": "5 s", "time.step": "20 ms"}
+    changes = {
+        "geometry.inlet.tma.mass_fractions.TMA": mass_fraction,
+        "output.every": "5 s",
+        "time.step": "20 ms",
+    }
     _, result = run(zone(changes))
     profile = result.summary["titration"]["tma"]["exit_profile"]
     assert result.summary["excess_number"]["tma"] == pytest.approx(mass_fraction / 1e-4 * 0.896, rel=1e-2)
@@ -222,9 +240,16 @@ def test_result_and_callback() -> None:
     times: list[float] = []
     reactor = Reactor(zone(SHORT, TINY), MPI.COMM_SELF)
     result = reactor.run(callback=lambda r: times.append(r.time))
-    np.testing.assert_allclose(times, [0.0, 0.25, 0.5, 0.75, 1.0], atol=1e-9)
+    late = np.array(times) - [0.0, 0.25, 0.5, 0.75, 1.0]  # the first step that reaches the output time
+    assert late.min() >= -1e-9 and late.max() < reactor.schedule.dt
     assert result.history["time"].tolist() == times
-    for column in ("titration.tma.box_mean", "outlets.zone1.x.CH4", "cvd.rate_mean", "balance.TMA", "balance.sites"):
+    for column in (
+        "titration.tma.box_mean",
+        "outlets.zone1.x.CH4",
+        "cvd.rate_mean",
+        "balance.TMA",
+        "balance.sites",
+    ):
         assert column in result.history
     grid = reactor.grid
     assert result.field("C_TMA").shape == (grid.rows, grid.columns)
@@ -266,7 +291,9 @@ def test_a_failed_step_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
     _, whole = run(zone(SHORT, TINY))
     for key in ("fed", "reacted"):
-        assert halved.summary["species"]["TMA"][key] == pytest.approx(whole.summary["species"]["TMA"][key], rel=2e-3)
+        assert halved.summary["species"]["TMA"][key] == pytest.approx(
+            whole.summary["species"]["TMA"][key], rel=2e-3
+        )
 
 
 def test_newton_failure_keeps_the_last_good_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

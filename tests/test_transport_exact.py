@@ -56,10 +56,15 @@ def test_reacting_column_with_diffusion() -> None:
     exact = danckwerts(u, eps * diffusivity / tau, surface * A, length)
     for n in cells:
         case = column_case(
-            length, n, u,
+            length,
+            n,
+            u,
             {
-                "porosity": eps, "permeability": "4 um^2", "tortuosity_factor": [7.0, tau],
-                "surface_to_volume": f"{surface} 1/m", "site_density": "1e4 mol/m^2",
+                "porosity": eps,
+                "permeability": "4 um^2",
+                "tortuosity_factor": [7.0, tau],
+                "surface_to_volume": f"{surface} 1/m",
+                "site_density": "1e4 mol/m^2",
             },
             inlet={"mass_fractions": {"TMA": 2e-4}},
             gas={"diffusivity": f"{diffusivity} m^2/s"},
@@ -83,7 +88,9 @@ def test_gaussian_solution() -> None:
     """sympy: the drifting Gaussian satisfies eps dC/dt + u.grad C = div(eps D/tau^2 grad C)."""
     t, x, y, u, v, eps, dx, dy, s = sp.symbols("t x y u v eps d_x d_y s", positive=True)
     wide, high = s + 2 * dx * t, s + 2 * dy * t
-    c = sp.exp(-((x - u * t / eps) ** 2) / (2 * wide) - (y - v * t / eps) ** 2 / (2 * high)) / sp.sqrt(wide * high)
+    c = sp.exp(-((x - u * t / eps) ** 2) / (2 * wide) - (y - v * t / eps) ** 2 / (2 * high)) / sp.sqrt(
+        wide * high
+    )
     residual = eps * sp.diff(c, t) + u * sp.diff(c, x) + v * sp.diff(c, y)
     residual -= eps * (dx * sp.diff(c, x, 2) + dy * sp.diff(c, y, 2))
     assert sp.simplify(residual / c) == 0
@@ -119,8 +126,12 @@ def test_drifting_gaussian() -> None:
 
         def exact(t: float, x: np.ndarray = x, y: np.ndarray = y) -> np.ndarray:
             wide, high = s + 2 * diffusivity / tau[0] * t, s + 2 * diffusivity / tau[1] * t
-            along = sum(np.exp(-((x - start[0] - u / eps * t + k * width) ** 2) / (2 * wide)) for k in (-1, 0, 1, 2))
-            return s * along * np.exp(-((y - start[1] - v / eps * t) ** 2) / (2 * high)) / np.sqrt(wide * high)
+            along = sum(
+                np.exp(-((x - start[0] - u / eps * t + k * width) ** 2) / (2 * wide)) for k in (-1, 0, 1, 2)
+            )
+            return (
+                s * along * np.exp(-((y - start[1] - v / eps * t) ** 2) / (2 * high)) / np.sqrt(wide * high)
+            )
 
         transport.concentration = exact(0.0)[None, :]
         steps = 8 * (n // 20) ** 2
@@ -204,8 +215,12 @@ def test_uptake_equals_what_is_missing_at_the_outlet() -> None:
     assert tma["fed"] == pytest.approx(0.035 * 3e-3 * c0 * 2.0, rel=1e-12)
     packing, height = case.materials["packing"], result.grid.dy[:, None]
     sites = packing.surface_to_volume * packing.site_density * result.grid.dx
-    assert tma["reacted"] == pytest.approx((sites * height * result.coverage("packing", "OAl(CH3)2")).sum(), rel=1e-10)
-    assert tma["stored"] == pytest.approx((0.4 * result.grid.dx * height * result.field("C_TMA")).sum(), rel=1e-10)
+    assert tma["reacted"] == pytest.approx(
+        (sites * height * result.coverage("packing", "OAl(CH3)2")).sum(), rel=1e-10
+    )
+    assert tma["stored"] == pytest.approx(
+        (0.4 * result.grid.dx * height * result.field("C_TMA")).sum(), rel=1e-10
+    )
     assert ch4["produced"] == pytest.approx(tma["reacted"], rel=1e-12)
 
 

@@ -1,0 +1,102 @@
+"""The same run on one rank and on all ranks: the physical numbers of its summary, its fields and its history agree to 1e-8."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mpm.case import Case
+from mpm.errors import InputError
+from mpm.parallel import Scatter, on_root, total
+from mpm.reactor import Reactor
+
+from .cases import MPI, SHORT, TINY, assert_same_numbers, cycle, run, zone
+
+COMM = MPI.COMM_WORLD
+pytestmark = pytest.mark.parallel
+
+CASES: dict[str, Case] = {
+    "averaged": zone({**SHORT, "output.every": "0.5 s"}),
+    "resolved": zone(
+        {"fidelity": "resolved", "time.end": "0.2 s", "time.steps_per_cycle": 16, "output.every": "0.1 s"}, TINY
+    ),
+    "impulsive, ports reversing in the lab": zone(
+        {
+            "fidelity": "resolved", "time.end": "0.25 s", "output.every": "0.1 s",
+            "motion.startup": "impulsive", "motion.inlet_frame": "lab", "motion.gamma": 0.6,
+        },
+        TINY,
+    ),
+    "both precursors, every species its own diffusivity": cycle(
+        {
+            "time.end": "4 s", "time.step": "40 ms", "output.every": "2 s", "geometry.bed_inflow": "periodic",
+            "gas.diffusivity": {"TMA": "1e-5 m^2/s", "H2O": "4e-5 m^2/s", "CH4": "3e-5 m^2/s", "Al(OH)3": "8e-6 m^2/s"},
+        },
+        TINY,
+    ),
+    "walls, inlet diffusion": zone(
+        {"time.end": "0.5 s", "output.every": "0.25 s", "geometry.periodic": False, "geometry.inlet_diffusion": True}, TINY
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_ranks_agree(name: str, tmp_path: Path) -> None:
+    """Fails when any physical number, field or history entry depends on the number of ranks by more than 1e-8.
+
+    The reference is computed in the same process on one rank. Files are written in the parallel run, which every rank must survive.
+    """
+    case = CASES[name]
+    _, alone = run(case, MPI.COMM_SELF)
+    _, together = run(case, COMM, output=tmp_path / "run")
+    assert together.summary["ranks"] == COMM.size and alone.summary["ranks"] == 1
+    assert_same_numbers(alone.summary, together.summary, 1e-8)
+    for field in ("C_TMA", "C_CH4", "velocity"):
+        a, b = alone.field(field), together.field(field)
+        np.testing.assert_allclose(b, a, rtol=0.0, atol=1e-8 * np.abs(a).max(), err_msg=field)
+    np.testing.assert_allclose(together.coverage("bed", "OH"), alone.coverage("bed", "OH"), atol=1e-8)
+    for column, values in alone.history.items():
+        if not column.startswith(("balance.", "cvd.")):  # the gas reaction begins at 1e-30 of its later rate
+            np.testing.assert_allclose(
+                together.history[column], values, rtol=1e-7, atol=1e-12, err_msg=column
+            )
+    if COMM.rank == 0:
+        for file in ("summary.json", "history.csv", "fields.pvd", "checkpoint.npz", "case.toml", "run.log"):
+            assert (tmp_path / "run" / file).exists(), file
+
+
+def test_every_rank_has_cells() -> None:
+    """Fails when the mesh is not spread over the ranks: the other tests would prove nothing."""
+    reactor = Reactor(CASES["averaged"], COMM)
+    owned = reactor.strip.owned
+    assert owned > 0.5 * reactor.grid.cells / COMM.size
+    assert total(COMM, [owned])[0] == reactor.grid.cells
+
+
+def test_errors_on_the_first_rank_reach_all(tmp_path: Path) -> None:
+    """Fails when a refusal that only rank 0 can see (a directory that is not empty) leaves the other ranks waiting."""
+    if COMM.rank == 0:
+        (tmp_path / "run").mkdir()
+        (tmp_path / "run" / "notes.txt").write_text("mine\n")
+    COMM.Barrier()
+    with pytest.raises(InputError):
+        Reactor(zone(SHORT, TINY), COMM).run(output=tmp_path / "run")
+
+    def fail() -> None:
+        raise InputError("only here")
+
+    with pytest.raises(InputError, match="only here"):
+        on_root(COMM, fail)
+
+
+def test_gathers_of_uneven_and_empty_shares() -> None:
+    """Fails when a rank without values, or with all of them, breaks a gather."""
+    mine = np.arange(5) if COMM.rank == 0 else np.empty(0, np.int64)
+    scatter = Scatter(COMM, mine, 5)
+    np.testing.assert_array_equal(scatter.to_all(10.0 * mine), 10.0 * np.arange(5))
+    both = scatter.to_all(np.stack([1.0 * mine, -1.0 * mine]))
+    np.testing.assert_array_equal(both, [np.arange(5), -np.arange(5)])
+    root = scatter.to_root(1.0 * mine)
+    assert (root is None) == (COMM.rank != 0)
+    nothing = Scatter(COMM, np.empty(0, np.int64), 0)
+    assert nothing.to_all(np.empty((3, 0))).shape == (3, 0)
