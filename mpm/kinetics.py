@@ -7,7 +7,7 @@ Over a step dt the coverages of a cell follow its new concentrations,
 
 with Q a matrix whose off-diagonal entries are >= 0 and whose columns sum to zero, because every reaction conserves sites. Hence
 theta' >= 0 and sum theta' = sum theta for any C' >= 0 and any step: coverage stays within [0, 1] by construction. A negative
-concentration (a Newton iterate) leaves Q as it is at zero and enters r_r linearly, which keeps the uptake monotone and concave.
+concentration (a Newton iterate) leaves Q as it is at zero and enters all r_r linearly, which keeps the uptake monotone and concave.
 """
 
 from __future__ import annotations
@@ -145,9 +145,8 @@ class SurfaceKinetics:
             values[r] = self.constant[r] * concentration[g] * new[s]
             slopes[r, g] += self.constant[r] * new[s]
             for other, j in enumerate(self.gas):
-                positive = concentration[j] > 0.0
-                slope = self.constant[other] / self.sites * response[other, s] * positive
-                slopes[r, j] += self.constant[r] * concentration[g] * slope
+                factor = self.constant[r] * self.constant[other] / self.sites * response[other, s]
+                _respond(values[r], slopes[r], concentration, g, j, factor)
         return values, slopes
 
     def conveyed(self, concentration: Floats, theta: Floats, time: Floats | float) -> Exposure:
@@ -192,8 +191,8 @@ class SurfaceKinetics:
             slopes[r, g] += self.constant[r] * mean[s]
             values_theta[r] = self.constant[r] * concentration[g] * mean_theta[s]
             for other, j in enumerate(self.gas):
-                dq = self.constant[other] / self.sites * (concentration[j] > 0.0)
-                slopes[r, j] += self.constant[r] * concentration[g] * mean_q[other, s] * dq
+                factor = self.constant[r] * self.constant[other] / self.sites * mean_q[other, s]
+                _respond(values[r], slopes[r], concentration, g, j, factor)
         for other, j in enumerate(self.gas):
             out_c[:, j] += out_q[other] * (self.constant[other] / self.sites * (concentration[j] > 0.0))
         return Exposure(values, slopes, values_theta, out, out_c, out_theta)
@@ -278,6 +277,21 @@ class GasKinetics:
             slopes[r, a] += self.constant[r] * positive[b] * (concentration[a] > 0.0)
             slopes[r, b] += self.constant[r] * positive[a] * (concentration[b] > 0.0)
         return values, slopes
+
+
+def _respond(rate: Floats, slopes: Floats, concentration: Floats, g: int, j: int, factor: Floats) -> None:
+    """Add to a rate of gas `g` (n,) and its `slopes` (coupled, n) what the coverage's response to C_j brings, factor C_g per unit C_j.
+
+    Where C_j < 0 the rate follows its tangent at zero. Solids at rest that see both precursors turn over at a harmonic mean of the two
+    supplies, which is concave; its tangents keep it so beyond zero, where a rate that ignored C_j would have a kink that stalls Newton.
+    """
+    own = concentration[g]
+    if j == g:
+        slopes[j] += factor * own * (own > 0.0)
+    else:
+        slope = factor * np.maximum(own, 0.0)
+        slopes[j] += slope
+        rate += slope * np.minimum(concentration[j], 0.0)
 
 
 def phi1(x: Floats) -> Floats:
