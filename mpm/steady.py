@@ -315,7 +315,10 @@ class SteadyProblem:
             transport.concentration[i] = transport.solve_steady(i, self.operators[i], supply)
         drawn = transport.outlet_means(self.operators, transport.concentration)
         transport.book(self.operators, 1.0, self.shares, drawn, events, gas_events)
-        bed.theta = self.theta
+        bed.theta = self.theta.copy()
+        resting = transport.surface.part(self.resting)
+        at_rest = self.concentration[:, bed.cells[self.resting]]
+        bed.theta[:, self.resting] = resting.coverage(at_rest, self.old[1][:, self.resting], LAST_STEP)
         if len(self.moving) and not self.periodic:
             entering = self.incoming()
             last, first = self.column == bed.columns - 1, self.column == 0
@@ -381,7 +384,8 @@ class SteadyProblem:
             incoming = _fixed_point(m, aged, share, incoming)
         theta = np.empty_like(aged)
         for j in range(len(m)):
-            incoming = theta[j] = np.einsum("roi,ri->ro", m[j], share * incoming + aged[j])
+            incoming = np.einsum("roi,ri->ro", m[j], share * incoming + aged[j])
+            incoming = theta[j] = incoming / incoming.sum(axis=1, keepdims=True)  # rounding would add up along the bed
         result = np.zeros((k, len(bed.rows), bed.columns))
         result[:, bed.moving_rows] = np.moveaxis(theta, (0, 1, 2), (2, 1, 0))
         new = self.theta.copy()
