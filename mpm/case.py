@@ -190,7 +190,7 @@ class Output(Frozen):
 
 
 class Transport(Frozen):
-    """Options of the species' transport."""
+    """Options of the species' transport: in `averaged` and `steady` runs, add to diffusion what the vibration disperses."""
 
     vibrational_dispersion: Flag = False
 
@@ -220,6 +220,12 @@ class Case(Frozen):
             if layer.material_name is not None:
                 layer._material = self.materials[layer.material_name]
         self._check_chemistry()
+        if self.transport.vibrational_dispersion and self.fidelity == "resolved":
+            raise reject(
+                "true in a resolved run, which follows the vibration itself",
+                'false, or fidelity "averaged" or "steady"',
+                key="transport.vibrational_dispersion",
+            )
         peak = self.motion.peak_vertical_velocity
         if self.motion.inlet_frame == "lab" and self.fidelity != "resolved":
             for inlet in self.geometry.inlets:

@@ -50,6 +50,9 @@ def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
         "right": np.asarray(bed.right),
         "sites_initially": reactor.sites_initially,
     }
+    if isinstance(flows, Replay) and flows.dispersion is not None:
+        dispersion = scatter.to_root(flows.dispersion[:, :, : reactor.strip.owned])
+        arrays |= {"dispersion": dispersion} if dispersion is not None else {}
     if reactor.before is not None:
         arrays |= {f"before_{name}": np.asarray(getattr(reactor.before, name)) for name in BEFORE}
     meta = {
@@ -100,7 +103,8 @@ def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
         march.restore(fields, meta["marched"])
         reactor.flows = march
     else:
-        reactor.flows = Replay(strip, fields, reactor.schedule.resting_steps > 0)
+        dispersion = arrays["dispersion"][:, :, strip.cell] if "dispersion" in arrays else None
+        reactor.flows = Replay(strip, fields, reactor.schedule.resting_steps > 0, dispersion)
     reactor.flows.register(transport)
     if "before_out" in arrays:
         now = reactor.totals()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mpm import checkpoint, fem  # noqa: F401  (fem first: it loads the finite-element stack)
 from mpm.bed import Bed
 from mpm.diagnostics import State, Totals, total_concentration
+from mpm.dispersion import vibrational_dispersion
 from mpm.errors import ConvergenceError, InputError, Interrupted
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
@@ -163,6 +164,10 @@ class Reactor:
                 self._check_stop()
 
             self.flows = Replay.solve(self.case, self.strip, self.motion, self.schedule, watch)
+            if self.case.transport.vibrational_dispersion:
+                self.flows.dispersion = vibrational_dispersion(
+                    self.case, self.strip, self.motion, self.transport.diffusivities, watch
+                )
         self.flows.register(self.transport)
 
     def _run_steady(

@@ -22,10 +22,13 @@ Floats = NDArray[np.float64]
 
 
 class Replay:
-    """A list of fields: first the one at rest where the run needs it, then one per phase."""
+    """A list of fields: first the one at rest where the run needs it, then one per phase.
 
-    def __init__(self, strip: Strip, fields: list[FlowField], rests: bool):
-        self.strip, self.fields, self.rests = strip, fields, rests
+    `dispersion` (diffusivities, 2, local cells) [m2/s] is what the vibration adds to diffusion where a mean stands for the cycle.
+    """
+
+    def __init__(self, strip: Strip, fields: list[FlowField], rests: bool, dispersion: Floats | None = None):
+        self.strip, self.fields, self.rests, self.dispersion = strip, fields, rests, dispersion
 
     @classmethod
     def solve(
@@ -48,8 +51,10 @@ class Replay:
         return cls(strip, fields, rests)
 
     def register(self, transport: Transport) -> None:
-        """Make the transport's operators; they are numbered as the fields."""
-        for field in self.fields:
+        """Make the transport's operators; they are numbered as the fields. At rest nothing disperses."""
+        for number, field in enumerate(self.fields):
+            if number == int(self.rests) and self.dispersion is not None:
+                transport.disperse(self.dispersion)
             transport.add_flow(face_flow(self.strip, field.velocities))
 
     def number(self, step: Step, transport: Transport) -> int:

@@ -61,10 +61,10 @@ class Transport:
     """Concentrations of all species that can appear, and the solvers that advance them.
 
     `names` are those species, `concentration` (species, own cells) [mol/m3]. Operators for the velocity fields of a run are made with
-    `add_flow`; `advance` takes one step with one of them.
+    `add_flow`; `advance` takes one step with one of them. `diffusivities` [m2/s] are those that differ.
     """
 
-    def __init__(self, case: Case, strip: Strip, bed: Bed, dispersion: tuple[Floats, Floats] | None = None):
+    def __init__(self, case: Case, strip: Strip, bed: Bed):
         self.case, self.strip, self.bed = case, strip, bed
         mechanism = case.mechanism
         self.feed = {
@@ -110,12 +110,12 @@ class Transport:
             ),
             default=0.0,
         )
-        self._distinct = sorted(set(diffusivities))
-        self._group = [self._distinct.index(d) for d in diffusivities]
-        self._assemblers = [FluxAssembler(case, strip, d, dispersion) for d in self._distinct]
+        self.diffusivities = sorted(set(diffusivities))
+        self._group = [self.diffusivities.index(d) for d in diffusivities]
+        self._assemblers = [FluxAssembler(case, strip, d) for d in self.diffusivities]
         self._flows: list[list[FluxOperator]] = []
         self._linear = [
-            StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s") for d in self._distinct
+            StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s") for d in self.diffusivities
         ]
         if self.roles.coupled:
             self._jacobian = CellMatrix(strip, len(self.roles.coupled))
@@ -132,6 +132,13 @@ class Transport:
         self.nu_gas = np.array([[r.nu.get(n, 0.0) for n in self.names] for r in self.gas.reactions]).reshape(
             len(self.gas.reactions), len(self.names)
         )
+
+    def disperse(self, dispersion: Floats) -> None:
+        """Add `dispersion` (diffusivities, 2, local cells) [m2/s] along x and y in all velocity fields that are added from now on."""
+        self._assemblers = [
+            FluxAssembler(self.case, self.strip, d, (along_x, along_y))
+            for d, (along_x, along_y) in zip(self.diffusivities, dispersion, strict=True)
+        ]
 
     def add_flow(self, flow: FaceFlow) -> int:
         """Make the operators of a velocity field; returns its number."""
