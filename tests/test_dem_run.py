@@ -230,7 +230,20 @@ def test_waveform_command(tmp_path, capfd):
 def test_interrupted_run_goes_on(tiny, tmp_path):
     """SIGINT while two seeds run side by side: status 130, no child left, and --resume ends the run."""
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "mpm", "dem", str(tiny), "-o", str(out), "-q", "-j", "2", "--set", "box.height=2"]
+    command = [
+        sys.executable,
+        "-m",
+        "mpm",
+        "dem",
+        str(tiny),
+        "-o",
+        str(out),
+        "-q",
+        "-j",
+        "2",
+        "--set",
+        "box.height=2",
+    ]
     long = subprocess.Popen([*command, "--set", "run.cycles=400"], stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 120
     while not all((out / f"seed_{s}" / "state.npz").exists() for s in (1, 2)):
