@@ -39,6 +39,11 @@ def column(run: Run, name: str, start: float = 0.0, end: float = np.inf) -> Floa
     return run.history[name][(time >= start - 1e-9) & (time <= end + 1e-9)]
 
 
+def steady_cycle(lab: Lab, width: str, changes: dict[str, Any] | None = None) -> Run:
+    """The cycle's quasi-steady state, on the finest mesh there is."""
+    return lab.run(lab.best("cycle", {**ports(width), **STOICHIOMETRIC, **lab.settled, **(changes or {})}))
+
+
 def dose_ratios(case: Case) -> dict[str, float]:
     """Excess number over what saturation needs, per dosing inlet."""
     found = {i.name: inlet_excess(case, i) for i in case.geometry.inlets}
@@ -68,12 +73,16 @@ def similar_boxes(lab: Lab) -> Finding:
             "zone 2 at 0 s": start,
             "within 5 % since": since if len(apart) and apart[-1] + 1 < len(whole[0]) else None,
             "dose_ratio": dose_ratios(run.case),
+            "steady": {
+                name: steady_cycle(lab, width).summary["titration"][name]["box_mean"]
+                for name in ("tma", "water")
+            },
         }
         checks.add(f"within 5 %, ports {width}", difference < 0.05)
         checks.add(f"zone 2 starts at 1, ports {width}", start > 0.999)
     measured = "; ".join(
         f"{w}: {n['zone 1 at 30, 60 s'][1]:.3f} and {n['zone 2 at 30, 60 s'][1]:.3f} at 60 s, "
-        f"largest difference {n['difference']:.1%} from 30 s, "
+        f"steady {n['steady']['tma']:.3f} and {n['steady']['water']:.3f}, largest difference {n['difference']:.1%} from 30 s, "
         + (
             f"within 5 % since {n['within 5 % since']:.1f} s"
             if n["within 5 % since"] is not None
@@ -132,7 +141,8 @@ def alike(lab: Lab) -> Finding:
         places = {name: bed_front(run, name) for name in ("tma", "water")}
         tma, water = places.values()
         shift = None if tma is None or water is None else abs(tma - water)
-        numbers[width] = {**places, "shift": shift}
+        steady = [bed_front(steady_cycle(lab, width), name) for name in ("tma", "water")]
+        numbers[width] = {**places, "shift": shift, "steady": steady}
         limit = next(i.width for i in run.case.geometry.inlets if i.name == "tma")
         checks.add(f"ports {width}", shift is not None and shift <= limit)
     measured = "; ".join(
@@ -157,12 +167,14 @@ def cvd_place(lab: Lab) -> Finding:
         cvd = run.summary["cvd"]
         numbers[width] = {
             "now": cvd["share_in_zone"]["zone1"],
+            "steady": steady_cycle(lab, width).summary["cvd"]["share_in_zone"]["zone1"],
             "over the run": cvd["total_in_zone"]["zone1"] / cvd["total"],
             "contamination": run.summary["contamination"],
         }
         checks.add(f"ports {width}", numbers[width]["now"] > 0.5)
     measured = "; ".join(
-        f"{w}: {n['now']:.1%} at the end, {n['over the run']:.1%} over the run" for w, n in numbers.items()
+        f"{w}: {n['now']:.1%} at the end, {n['over the run']:.1%} over the run, {n['steady']:.1%} in the steady state"
+        for w, n in numbers.items()
     )
     return Finding(
         checks.verdict, measured, numbers, "The rate follows the product of the two concentrations."
@@ -231,7 +243,7 @@ def delay_harmless(lab: Lab) -> Finding:
     )
 
 
-RATIOS = (0.5, 0.75, 1.0, 1.5, 2.0, 4.0)
+RATIOS = (0.5, 1.0, 2.0)
 
 
 @row(
@@ -242,7 +254,7 @@ RATIOS = (0.5, 0.75, 1.0, 1.5, 2.0, 4.0)
 )
 def cvd_map(lab: Lab) -> Finding:
     checks, numbers = Checks(), {}
-    ratios = (0.5, 1.0, 2.0) if lab.coarse else RATIOS
+    ratios = RATIOS
     for width in WIDTHS:
         base = dose_ratios(lab.case("cycle", "coarse", {**ports(width), **STOICHIOMETRIC}))
         rate, film, feed = (np.zeros((len(ratios), len(ratios))) for _ in range(3))

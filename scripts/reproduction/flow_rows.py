@@ -20,7 +20,7 @@ EARLY = 1
 """Cycle of the start-up transient that is looked at: the second after the vibration starts."""
 
 
-def resolved(lab: Lab, base: str = "zone", mesh: str = "medium", **motion: Any) -> Case:
+def resolved(lab: Lab, base: str = "zone", mesh: str = "light", **motion: Any) -> Case:
     """A resolved case, with keys of `[motion]`."""
     changes = {"fidelity": "resolved", "time.steps_per_cycle": 16 if lab.coarse else 32}
     return lab.case(base, mesh, {**changes, **{f"motion.{key}": value for key, value in motion.items()}})

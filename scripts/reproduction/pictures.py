@@ -71,7 +71,7 @@ def concentrations(lab: Lab) -> Figure:
     figure = Figure(figsize=(10.0, 5.4), layout="constrained")
     axes = figure.subplots(2, 2, sharex=True, sharey=True)
     for panel, (title, changes) in zip(axes.flat, cases, strict=True):
-        run = lab.run(lab.case("zone", "medium", changes))
+        run = lab.run(lab.case("zone", "light", changes))
         share = run.field(run.snapshot(), "C_TMA") / zone_rows.feed(run.case)
         mesh = strip_map(panel, run, np.maximum(share, 1e-4), LogNorm(1e-4, 1.0), "viridis", title)
         x, y = 0.5 * (run.grid.x[1:] + run.grid.x[:-1]), 0.5 * (run.grid.y[1:] + run.grid.y[:-1])
@@ -87,10 +87,10 @@ def box_means(lab: Lab) -> Figure:
     figure = Figure(figsize=(8.4, 3.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     for gamma in zone_rows.GAMMAS:
-        run = lab.run(zone_rows.pulse_case(lab, "light", "impulsive", "reactor", gamma))
+        run = lab.run(zone_rows.pulse_case(lab, "coarse", "impulsive", "reactor", gamma))
         left.plot(run.history["time"], run.history["titration.tma.box_mean"], label=f"Gamma {gamma:.1f}")
     for speed in zone_rows.SPEEDS:
-        run = lab.run(lab.case("zone", "medium", {"motion.bed_velocity": speed}))
+        run = lab.run(lab.case("zone", "light", {"motion.bed_velocity": speed}))
         right.plot(run.history["time"], run.history["titration.tma.box_mean"], label=speed)
     for panel, title in ((left, "start-up transient, 1.3 cm/s"), (right, "cycle mean, Gamma 0.30")):
         panel.set(xlabel="time [s]", ylabel=f"box mean of {formula(SITE)}", title=title)
