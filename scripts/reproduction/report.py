@@ -52,6 +52,7 @@ def write_report(lab: Lab, pictures: bool) -> None:
     from reproduction.streamlines import STREAMS, draw_streams
 
     if pictures:
+        lab.only_stored = True
         draw(lab, FIGURES)
         draw_streams(lab, FIGURES)
     rows = {name: found for name in ROWS if (found := measured(lab, name)) is not None}

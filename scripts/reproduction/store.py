@@ -32,13 +32,14 @@ Arrays = dict[str, NDArray[Any]]
 class Lab:
     """Where a row gets its runs from. `coarse` puts every case on the coarsest mesh, for tests.
 
-    `finest` asks for the thesis' own mesh where a row offers it. `used` collects mesh and fidelity of the row's cases, for the table.
+    With `only_stored` nothing is run: what is missing raises FileNotFoundError. `finest` asks for the thesis' own mesh where a row offers it. `used` collects mesh and fidelity of the row's cases, for the table.
     """
 
     folder: Path
     coarse: bool = False
     say: Callable[[str], None] = print
     finest: bool = False
+    only_stored: bool = False
     used: dict[str, set[str]] = field(default_factory=dict)
 
     def case(self, base: str, mesh: str = "medium", changes: Mapping[str, Any] | None = None) -> Case:
@@ -70,6 +71,7 @@ class Lab:
         """The finished run of `case`, made or continued when it is not there yet. Raises what the run raises."""
         directory = self.folder / "runs" / case.content_hash()[:16]
         if not self._done(directory):
+            self._may_run(case)
             from mpm.reactor import Reactor
 
             started = time.monotonic()
@@ -77,6 +79,10 @@ class Lab:
             Reactor(case).run(directory, resume=resume, overwrite=not resume)
             self.say(f"  run {directory.name} ({case.title}) in {time.monotonic() - started:.0f} s")
         return load_run(directory)
+
+    def _may_run(self, case: Case) -> None:
+        if self.only_stored:
+            raise FileNotFoundError(f"no stored run of {case.title}")
 
     def has(self, case: Case) -> bool:
         """Whether the finished run of `case` is in the store."""
@@ -91,6 +97,7 @@ class Lab:
         key = hashlib.sha256(f"{case.content_hash()} {kind}".encode()).hexdigest()[:16]
         path = self.folder / "flows" / f"{key}.npz"
         if not path.exists():
+            self._may_run(case)
             started = time.monotonic()
             arrays = make()
             path.parent.mkdir(parents=True, exist_ok=True)

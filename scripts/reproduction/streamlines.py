@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -169,7 +170,7 @@ STREAMS["vibration_cycle"] = (
 def draw_streams(lab: Lab, folder: Path) -> None:
     """Draw the streamlines and the animation."""
     folder.mkdir(parents=True, exist_ok=True)
-    with style.context(STYLE):
+    with style.context(STYLE), suppress(FileNotFoundError):  # the rows have not been measured
         for name, (make, _) in STREAMS.items():
             if make is not None:
                 save(make(lab), folder / f"{name}.png", DPI)
