@@ -32,7 +32,8 @@ Arrays = dict[str, NDArray[Any]]
 class Lab:
     """Where a row gets its runs from. `coarse` puts every case on the coarsest mesh, for tests.
 
-    With `only_stored` nothing is run: what is missing raises FileNotFoundError. `finest` asks for the thesis' own mesh where a row offers it. `used` collects mesh and fidelity of the row's cases, for the table.
+    With `only_stored` nothing is run: what is missing raises FileNotFoundError. `finest` asks for the thesis' own mesh where a
+    row offers it. `used` collects mesh and fidelity of the row's cases, for the table.
     """
 
     folder: Path
