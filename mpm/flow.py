@@ -166,7 +166,7 @@ class FlowProblem:
                     1.0 / self.dt, self.mass_matrix, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
                 )
             matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
-            self._solvers[kind] = DirectSolver(matrix, f"flow ({kind})")
+            self._solvers[kind] = DirectSolver(matrix, f"flow ({kind})", symmetric=True)
         return self._solvers[kind]
 
     # --- solving ---
@@ -242,7 +242,7 @@ class FlowProblem:
         ksp.setOperators(matrix, stokes.matrix)
         ksp.setPC(stokes.ksp.getPC())
         ksp.setOperators(matrix, stokes.matrix)
-        ksp.setGMRESRestart(100)
+        ksp.setGMRESRestart(30)
         ksp.solve(residual, self._fix)
         check(ksp, "flow (Newton)")
         self.state.x.array[: self._own] -= self._fix.array
