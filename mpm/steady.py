@@ -385,7 +385,10 @@ class SteadyProblem:
         theta = np.empty_like(aged)
         for j in range(len(m)):
             incoming = np.einsum("roi,ri->ro", m[j], share * incoming + aged[j])
-            incoming = theta[j] = incoming / incoming.sum(axis=1, keepdims=True)  # rounding would add up along the bed
+            incoming = np.maximum(incoming, 0.0)
+            incoming = theta[j] = incoming / incoming.sum(
+                axis=1, keepdims=True
+            )  # rounding would add up along the bed
         result = np.zeros((k, len(bed.rows), bed.columns))
         result[:, bed.moving_rows] = np.moveaxis(theta, (0, 1, 2), (2, 1, 0))
         new = self.theta.copy()

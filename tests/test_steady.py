@@ -1,0 +1,169 @@
+"""The quasi-steady state: found from a cold start over a grid of cases, the long-time limit of averaged runs, an exact mass balance,
+the same on any number of ranks, and a failure that leaves something to look at."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mpm.steady
+from mpm.case import Case
+from mpm.cli import main
+from mpm.reactor import Reactor
+from mpm.replay import Replay
+
+from .cases import (
+    CASES,
+    COARSE,
+    MPI,
+    TINY,
+    assert_laws,
+    assert_same_numbers,
+    cycle,
+    physical_numbers,
+    run,
+    zone,
+)
+
+STEADY = {"fidelity": "steady"}
+TMA, WATER = "geometry.inlet.tma.mass_fractions.TMA", "geometry.inlet.water.mass_fractions.H2O"
+DOSES = (1e-5, 1e-4, 2e-4, 1e-3, 1e-2)
+SPEEDS = (0.1, 0.5, 1.3, 5.0)  # cm/s
+
+
+def grid_case(kind: str, dose: float, speed: float, mesh: dict) -> Case:
+    """Single zone, or single cycle with the stoichiometric amount of water (molar 1 : 1.5)."""
+    changes = {**STEADY, TMA: dose, "motion.bed_velocity": f"{speed} cm/s"}
+    return cycle({**changes, WATER: 0.375 * dose}, mesh) if kind == "cycle" else zone(changes, mesh)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed", SPEEDS)
+@pytest.mark.parametrize("kind", ["zone", "cycle"])
+def test_converges_from_a_cold_start(kind: str, speed: float) -> None:
+    """Fails when any dose from 1e-5 to 1e-2 does not converge at this bed speed, or converges to something that is out of balance."""
+    kept: Replay | None = None
+    for dose in DOSES:
+        reactor = Reactor(grid_case(kind, dose, speed, COARSE), MPI.COMM_SELF)
+        if kept is not None:  # the flow does not depend on the dose
+            reactor.flows = Replay(reactor.strip, kept.fields, kept.rests)
+        result = reactor.run(callback=assert_laws)
+        assert isinstance(reactor.flows, Replay)
+        kept = reactor.flows
+        assert result.summary["status"] == "done", (dose, speed)
+        assert 0 < reactor.steps < 300, reactor.steps
+
+
+@pytest.mark.parametrize(("dose", "speed"), [(1e-5, 1.3), (1e-4, 5.0), (2e-4, 5.0)])
+def test_exit_coverage_is_the_dose_ratio(dose: float, speed: float) -> None:
+    """Fails when fresh solids that take up all that is fed do not leave the zone with the dose ratio, to 1e-6: it is a mass balance.
+
+    These doses are below saturation and short of reaching the outlet; less than 1e-9 of the precursor leaves in the gas.
+    """
+    _, result = run(grid_case("zone", dose, speed, COARSE))
+    tma = result.summary["species"]["TMA"]
+    assert tma["left"] < 1e-9 * tma["fed"]
+    ratio, titration = result.summary["dose_ratio"]["tma"], result.summary["titration"]["tma"]
+    assert ratio < 0.5
+    assert titration["exit_mean"] == pytest.approx(ratio, abs=1e-6)
+
+
+@pytest.mark.parametrize(("dose", "speed"), [(1e-4, 1.3), (2e-4, 1.3), (1e-5, 0.1), (1e-2, 5.0)])
+def test_exit_coverage_when_precursor_leaves(dose: float, speed: float) -> None:
+    """Fails when what the solids carry out of the zone is not what was fed less what left in the gas, saturated or not."""
+    _, result = run(grid_case("zone", dose, speed, COARSE))
+    tma = result.summary["species"]["TMA"]
+    taken_up = result.summary["dose_ratio"]["tma"] * (1.0 - tma["left"] / tma["fed"])
+    assert result.summary["titration"]["tma"]["exit_mean"] == pytest.approx(taken_up, abs=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("dose", "speed", "end"), [(1e-4, "1.3 cm/s", 40), (2e-4, "5 cm/s", 16)])
+def test_long_time_limit_of_averaged(dose: float, speed: str, end: int) -> None:
+    """Fails when the mean coverage of the bed is more than 0.002 from where an averaged run on the same mesh ends.
+
+    There whole columns slide: the coverage of a cell goes from that of the solids entering it to that of those leaving, so its mean
+    over some slides is compared with the mean of both. The frit starts saturated, which it would become after hours.
+    """
+    changes = {TMA: dose, "motion.bed_velocity": speed}
+    site = "OAl(CH3)2"
+    _, steady = run(zone({**changes, **STEADY}))
+    leaving = steady.coverage("bed", site)
+    entering = np.concatenate([np.zeros((len(leaving), 1)), leaving[:, :-1]], axis=1)
+    averaged = Reactor(
+        zone(
+            {
+                **changes,
+                "time.end": f"{end} s",
+                "output.every": "10 ms",
+                "material.sintered_powder.initial_coverage": {"OH": 0.0, site: 1.0},
+            }
+        ),
+        MPI.COMM_SELF,
+    )
+    means: list[float] = []
+    averaged.run(callback=lambda r: means.append(float(r.coverage("bed", site).mean())))
+    period = averaged.grid.dx / averaged.motion.mean / averaged.case.time.step  # steps per slide
+    late, before = (
+        np.mean(means[-round(10 * period) :]),
+        np.mean(means[-round(20 * period) : -round(10 * period)]),
+    )
+    assert abs(late - before) < 0.001, "not settled"
+    assert 0.1 < late < 0.9
+    assert 0.5 * (leaving + entering).mean() == pytest.approx(late, abs=0.002)
+
+
+def test_solids_at_rest_are_saturated() -> None:
+    """Fails when the frit under the port, which precursor crosses for ever, is not converted, or the frit far from any is."""
+    _, result = run(zone(STEADY))
+    frit = result.coverage("frit", "OAl(CH3)2")
+    assert frit.min() > 1.0 - 1e-9  # diffusion brings some everywhere
+    _, both = run(cycle(STEADY, TINY))
+    oh = both.coverage("frit", "OH")
+    columns = oh.shape[1]
+    assert oh[:, int(0.875 * columns)].min() > 0.99 and oh[:, int(0.375 * columns)].max() < 0.01
+
+
+def test_periodic_solids_saturate() -> None:
+    """Fails when solids that return are not saturated by a single precursor in the end, whatever its dose: all of it then leaves."""
+    _, result = run(zone({**STEADY, "geometry.bed_inflow": "periodic"}, TINY))
+    tma = result.summary["species"]["TMA"]
+    assert result.summary["titration"]["tma"]["exit_min"] > 1.0 - 1e-9
+    assert tma["left"] == pytest.approx(tma["fed"], rel=1e-9)
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("kind", ["zone", "cycle"])
+def test_ranks_agree(kind: str) -> None:
+    """Fails when any physical number or field of the steady state depends on the number of ranks by more than 1e-8."""
+    case = grid_case(kind, 2e-4, 1.3, TINY)
+    _, alone = run(case, MPI.COMM_SELF)
+    _, together = run(case, MPI.COMM_WORLD)
+    assert_same_numbers(alone.summary, together.summary, 1e-8)
+    for field in ("C_TMA", "C_CH4"):
+        a, b = alone.field(field), together.field(field)
+        np.testing.assert_allclose(b, a, rtol=0.0, atol=1e-8 * a.max())
+    for layer in ("bed", "frit"):
+        np.testing.assert_allclose(together.coverage(layer, "OH"), alone.coverage(layer, "OH"), atol=1e-8)
+
+
+def test_failure_leaves_the_last_iterate(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when a solve that stops ends otherwise than with exit 3, one line that says where and what to try, and the last iterate."""
+    monkeypatch.setattr(mpm.steady, "LAST_TRIES", 2)
+    monkeypatch.setattr(mpm.steady, "TRIES", 3)
+    settings = [f"{key}={json.dumps(value)}" for key, value in {**TINY, **STEADY}.items()]
+    arguments = [part for setting in settings for part in ("--set", setting)]
+    status = main(["run", str(CASES / "single_zone.toml"), "-o", str(tmp_path / "run"), "-q", *arguments])
+    message = capsys.readouterr().err.strip()
+    assert status == 3
+    assert "\n" not in message
+    for part in ("steady state: Newton stopped", "of the feed", "x = ", "y = ", "averaged"):
+        assert part in message
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["status"] == "failed"
+    assert all(np.isfinite(v) for v in physical_numbers(summary).values())
+    assert (tmp_path / "run" / "fields.pvd").exists()
+    assert "Newton stopped" in (tmp_path / "run" / "run.log").read_text()
