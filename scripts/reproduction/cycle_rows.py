@@ -287,10 +287,14 @@ def cvd_map(lab: Lab) -> Finding:
         for w, n in numbers.items()
     )
     why = (
-        "Dose ratios are TMA, then water. Less feed always means less of both precursors left over, so "
-        "the rate itself is least at the leanest corner of any map, and it is "
-        "nowhere zero: both gases cross the purge zones of a periodic strip before they meet the bed. "
-        "What the stoichiometric pair does is to keep the rate low "
-        "without giving up titration."
+        "Dose ratios are TMA, then water. Less feed always means less of both precursors left over, so the rate itself is least at the "
+        "leanest corner of any map, and nowhere zero: both gases cross the purge zones of a periodic strip before they meet the bed. What "
+        "does hold is the steepness: "
+        + "; ".join(
+            f"with ports of {w} the rate falls by a factor of {n['rate at 2, 2'] / n['rate at 1, 1']:.0f} from twice the stoichiometric "
+            "doses to these doses, where both precursors are used up"
+            for w, n in numbers.items()
+        )
+        + "."
     )
     return Finding(checks.verdict, measured, numbers, why)

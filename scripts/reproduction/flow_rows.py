@@ -33,7 +33,7 @@ def below_frit(grid: Grid) -> int:
 
 def reverse_share(velocity: Floats) -> float:
     """Downward over upward flux through a horizontal line of equal facets."""
-    return float(-np.minimum(velocity, 0.0).sum() / np.maximum(velocity, 0.0).sum())
+    return float(abs(np.minimum(velocity, 0.0).sum()) / np.maximum(velocity, 0.0).sum())
 
 
 @row(

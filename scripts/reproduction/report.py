@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from mpm.files import write_atomically
+from reproduction import ROWS
 from reproduction.meshes import MESHES
-from reproduction.row import HOLDS, ROWS
+from reproduction.row import HOLDS
 from reproduction.store import ROOT, Lab
 
 DOCUMENT = ROOT / "docs" / "reproduction.md"
