@@ -211,6 +211,45 @@ def sweep(
     raise typer.Exit(run_sweep(path, output, jobs, ranks, scheduler))
 
 
+@app.command()
+def optimise(
+    case: CaseArgument,
+    target: Annotated[
+        float, typer.Option(help="wanted mean coverage at the exit of every dosed zone")
+    ] = 0.99,
+    weight: Annotated[float, typer.Option(help="moles of precursor that a mole of CVD is worth")] = 10.0,
+    velocities: Annotated[bool, typer.Option("--velocities", help="choose port velocities too")] = False,
+    limit: Annotated[int, typer.Option(help="steady states at most")] = 80,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/optimise/CASE")
+    ] = None,
+    settings: SetOption = None,
+) -> None:
+    """Find the doses that titrate the solids with the least precursor and CVD."""
+    from mpm.case import load_case
+
+    loaded = load_case(case, parse_settings(settings))
+    directory = output or Path("results") / "optimise" / Path(case).stem
+
+    from mpm import optimise as search
+
+    def say(point: search.Point) -> None:
+        exits = ", ".join(f"{name} {value:.4f}" for name, value in point.exits.items())
+        doses = ", ".join(
+            f"{key.removeprefix('geometry.inlet.')} = {v:.4g}" for key, v in point.doses.items()
+        )
+        print(f"{doses}: exits {exits}; CVD {point.cvd:.3g} mol/m/s", flush=True)
+
+    best, best_case, points = search.optimise(
+        loaded, target, weight, velocities, limit, say if rank() == 0 else lambda point: None
+    )
+    if rank() == 0:
+        search.write_search(directory, best_case, points)
+        print("Best:")
+        say(best)
+        print(f"Results: {directory}")
+
+
 @app.command(
     add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True}
 )

@@ -153,22 +153,26 @@ class Reactor:
         return directory if is_root(self.comm) else RunDirectory(output)
 
     def _start(self, bar: Progress) -> None:
-        """Find the flow of a fresh run."""
-        bar.say("flow")
-        if self.case.fidelity == "resolved" and self.case.motion.startup == "impulsive":
-            self.flows = March(self.case, self.strip, self.motion, self.schedule)
-        else:
-
-            def watch(cycle: int, change: float) -> None:
-                bar.say(f"flow, cycle {cycle + 1}, change {change:.1e}")
-                self._check_stop()
-
-            self.flows = Replay.solve(self.case, self.strip, self.motion, self.schedule, watch)
-            if self.case.transport.vibrational_dispersion:
-                self.flows.dispersion = vibrational_dispersion(
-                    self.case, self.strip, self.motion, self.transport.diffusivities, watch
-                )
+        """Find the flow of a fresh run, unless it was handed over."""
+        if self.flows is None:
+            bar.say("flow")
+            self.flows = self._find_flow(bar)
         self.flows.register(self.transport)
+
+    def _find_flow(self, bar: Progress) -> Replay | March:
+        if self.case.fidelity == "resolved" and self.case.motion.startup == "impulsive":
+            return March(self.case, self.strip, self.motion, self.schedule)
+
+        def watch(cycle: int, change: float) -> None:
+            bar.say(f"flow, cycle {cycle + 1}, change {change:.1e}")
+            self._check_stop()
+
+        flows = Replay.solve(self.case, self.strip, self.motion, self.schedule, watch)
+        if self.case.transport.vibrational_dispersion:
+            flows.dispersion = vibrational_dispersion(
+                self.case, self.strip, self.motion, self.transport.diffusivities, watch
+            )
+        return flows
 
     def _run_steady(
         self, directory: RunDirectory | None, callback: Callback | None, bar: Progress, begun: float

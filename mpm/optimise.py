@@ -1,0 +1,220 @@
+"""Doses that reach a wanted titration with the least precursor and the least parasitic CVD (`mpm optimise`).
+
+    minimise  (precursor fed + weight * CVD events) / precursor fed by the saturating doses
+    subject to  exit_mean of every dosed inlet's titration >= target
+
+over logarithms of mass fractions and, on request, port velocities; each point is one steady state. Where all precursor is consumed the
+exit coverage is the dose ratio, so the search starts there. scipy's COBYQA needs no derivatives: the exit coverage has a kink where
+precursor begins to leave.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from mpm.engineering import inlet_excess
+from mpm.errors import ConvergenceError, InputError
+from mpm.files import write_atomically
+from mpm.reactor import Reactor
+from mpm.replay import Replay
+
+if TYPE_CHECKING:
+    from mpm.case import Case
+
+log = logging.getLogger("mpm")
+RICHEST, LEANEST = 0.02, 1e-6  # mass fractions: dilute gas above, nothing happens below
+VELOCITIES = 5.0  # factor by which a port velocity may fall or rise
+STEP = 0.1  # first step of the search, in powers of e
+CLOSE = 1e-3  # relative change of the doses at which the search ends
+SLACK = 1e-4  # titration that may be missing
+MARGIN = 1e-3  # by how much the search aims higher, for its own tolerance
+
+
+@dataclass(frozen=True)
+class Dose:
+    """One number to choose: `key` of the case, its `start`, `lowest` and `highest` value, and its unit in the file."""
+
+    key: str
+    start: float
+    lowest: float
+    highest: float
+    unit: str = ""
+
+    def setting(self, value: float) -> float | str:
+        return f"{value!r} {self.unit}" if self.unit else value
+
+
+@dataclass(frozen=True)
+class Point:
+    """One steady state: the doses by key, `exits` the mean exit coverage by inlet, `fed` precursor and `cvd` events [mol per metre of
+    depth and second]."""
+
+    doses: Mapping[str, float]
+    exits: Mapping[str, float]
+    fed: float
+    cvd: float
+
+    def reaches(self, target: float) -> bool:
+        return min(self.exits.values()) >= target - SLACK
+
+
+def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
+    """Mass fraction (and port velocity) of every dosed inlet, starting where the dose ratio is `target`. Raises InputError."""
+    doses = []
+    for inlet in case.geometry.inlets:
+        excess = inlet_excess(case, inlet)
+        if excess is None:
+            continue
+        species, _, ratio = excess
+        fraction = inlet.mass_fractions[species] * target / ratio
+        key = f"geometry.inlet.{inlet.name}"
+        start = min(max(fraction, 2.0 * LEANEST), 0.5 * RICHEST)
+        doses.append(Dose(f"{key}.mass_fractions.{species}", start, LEANEST, RICHEST))
+        if velocities:
+            v = inlet.velocity
+            doses.append(Dose(f"{key}.velocity", v, v / VELOCITIES, v * VELOCITIES, "m/s"))
+    if not doses:
+        raise InputError(
+            "optimise: found no inlet that doses a moving bed; accepted: a case with one inlet or more that feeds a precursor"
+        )
+    return doses
+
+
+class Search:
+    """Steady states of `case` at chosen doses; every one is kept in `points`. The flow is found again only when a velocity changes."""
+
+    def __init__(self, case: Case, doses: list[Dose], target: float, weight: float):
+        self.case, self.doses = case.with_({"fidelity": "steady"}), doses
+        self.target, self.weight = target, weight
+        self.points: list[Point] = []
+        self._flow: tuple[tuple[float, ...], Replay] | None = None
+        self._known: dict[tuple[float, ...], Point | None] = {}
+
+    def case_at(self, values: Mapping[str, float]) -> Case:
+        return self.case.with_({dose.key: dose.setting(values[dose.key]) for dose in self.doses})
+
+    def point(self, logs: NDArray[np.float64]) -> Point | None:
+        """The steady state at exp(logs) of the doses; None where it is not found."""
+        key = tuple(float(v) for v in np.exp(logs))
+        if key not in self._known:
+            self._known[key] = self._solve(key)
+        return self._known[key]
+
+    def _solve(self, values: tuple[float, ...]) -> Point | None:
+        doses = {dose.key: value for dose, value in zip(self.doses, values, strict=True)}
+        reactor = Reactor(self.case_at(doses))
+        velocities = tuple(inlet.velocity for inlet in reactor.case.geometry.inlets)
+        if self._flow is not None and self._flow[0] == velocities:
+            kept = self._flow[1]
+            reactor.flows = Replay(reactor.strip, kept.fields, kept.rests, kept.dispersion)
+        try:
+            summary = reactor.run().summary
+        except ConvergenceError as error:
+            log.warning("optimise: %s", error)
+            return None
+        assert isinstance(reactor.flows, Replay)
+        self._flow = (velocities, reactor.flows)
+        dosed = {e[0] for i in reactor.case.geometry.inlets if (e := inlet_excess(reactor.case, i))}
+        point = Point(
+            doses,
+            {name: entry["exit_mean"] for name, entry in summary["titration"].items()},
+            sum(summary["species"][name]["fed"] for name in dosed),
+            summary["cvd"].get("total", 0.0),
+        )
+        self.points.append(point)
+        return point
+
+    def cost(self, point: Point) -> float:
+        """Precursor and CVD over what the first point, the saturating doses, feeds."""
+        return (point.fed + self.weight * point.cvd) / self.points[0].fed
+
+    def best(self) -> Point | None:
+        """The cheapest point that reaches the target."""
+        return min((p for p in self.points if p.reaches(self.target)), key=self.cost, default=None)
+
+
+def optimise(
+    case: Case,
+    target: float = 0.99,
+    weight: float = 10.0,
+    velocities: bool = False,
+    limit: int = 80,
+    watch: Callable[[Point], None] = lambda point: None,
+) -> tuple[Point, Case, Search]:
+    """Best doses, the case with them, and the whole search.
+
+    `weight`: moles of precursor that one mole of CVD is worth; `limit`: steady states at most. Raises InputError, and ConvergenceError
+    when no dose within bounds reaches the target.
+    """
+    if not 0.0 < target <= 1.0:
+        raise InputError(f"optimise: --target: found {target:g}; accepted: above 0 and at most 1")
+    search = Search(case, doses_of(case, target, velocities), target, weight)
+
+    def solved(logs: NDArray[np.float64]) -> Point | None:
+        before = len(search.points)
+        point = search.point(logs)
+        if len(search.points) > before:
+            watch(search.points[-1])
+        return point
+
+    aim = min(target + MARGIN, 0.5 * (1.0 + target))
+
+    def cost(logs: NDArray[np.float64]) -> float:
+        point = solved(logs)
+        return search.cost(point) if point else 1e3
+
+    def lacking(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Titration above the aim, by inlet."""
+        point = solved(logs)
+        return (
+            np.array(list(point.exits.values())) - aim
+            if point
+            else np.full(len(search.points[0].exits), -1.0)
+        )
+
+    start = np.log([d.start for d in search.doses])
+    if solved(start) is None:
+        raise ConvergenceError(
+            "optimise: the steady state at the first doses was not found; try another mesh"
+        )
+    minimize(
+        cost,
+        start,
+        method="COBYQA",
+        bounds=[(np.log(d.lowest), np.log(d.highest)) for d in search.doses],
+        constraints={"type": "ineq", "fun": lacking},
+        options={"maxfev": limit, "initial_tr_radius": STEP, "final_tr_radius": CLOSE},
+    )
+    best = search.best()
+    if best is None:
+        nearest = max(search.points, key=lambda p: min(p.exits.values()))
+        raise ConvergenceError(
+            f"optimise: none of {len(search.points)} steady states reaches {target:g} at every exit; the nearest has "
+            + ", ".join(f"{name} {value:.4f}" for name, value in nearest.exits.items())
+        )
+    return best, search.case_at(best.doses).with_({"fidelity": case.fidelity}), search
+
+
+def write_search(directory: Path, best: Case, search: Search) -> None:
+    """`case.toml`, the case with the best doses, and `points.csv`, every steady state [SI]."""
+    directory.mkdir(parents=True, exist_ok=True)
+    write_atomically(directory / "case.toml", best.to_toml())
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    first = search.points[0]
+    table.writerow(
+        [*first.doses, *(f"titration.{n}.exit_mean" for n in first.exits), "fed", "cvd.total", "cost"]
+    )
+    for p in search.points:
+        table.writerow([*p.doses.values(), *p.exits.values(), p.fed, p.cvd, search.cost(p)])
+    write_atomically(directory / "points.csv", text.getvalue())
