@@ -52,6 +52,7 @@ def worker(fidelity: str, seconds: float) -> None:
     with tempfile.TemporaryDirectory() as directory:
         result = reactor.run(reactor.comm.bcast(directory, root=0))
     wall = time.perf_counter() - begun
+    peak = total(reactor.comm, [resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0])[0]
     problem = FlowProblem(case, reactor.strip, reactor.schedule.dt)
     problem.settle(mean_motion(reactor.motion), problem.convective_force())
     problem.step(REST)
@@ -60,7 +61,6 @@ def worker(fidelity: str, seconds: float) -> None:
     for _ in range(steps):
         problem.step(REST)
     flow_step = (time.perf_counter() - start) / steps
-    peak = total(reactor.comm, [resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0])[0]
     wall = float(largest(reactor.comm, [wall])[0])
     if reactor.comm.rank == 0:
         numbers = {
