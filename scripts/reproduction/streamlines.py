@@ -76,8 +76,10 @@ def streams(gamma: float) -> Callable[[Lab], Figure]:
         arrays = cycle(lab, case)
         figure = Figure(figsize=(10.5, 9.6), layout="constrained")
         axes = figure.subplots(5, 2, sharex=True)
-        still = at_rest(lab, resolved(lab))["after_50ms"]
-        stream_panel(axes[0, 0], case, still, (0.0, 0.0), "before the vibration")
+        before = resolved(lab, mesh="thesis")
+        stream_panel(
+            axes[0, 0], before, at_rest(lab, before)["after_50ms"], (0.0, 0.0), "before the vibration"
+        )
         axes[0, 1].set_axis_off()
         for row, phase in zip(axes[1:], SHOWN_PHASES, strict=True):
             k = at_phase(arrays, phase)
