@@ -148,7 +148,7 @@ def animation(lab: Lab, path: Path) -> None:
         canvas.draw()
         frames.append(
             Image.fromarray(np.asarray(canvas.buffer_rgba())).convert(
-                "P", palette=Image.Palette.ADAPTIVE, colors=48
+                "P", palette=Image.Palette.ADAPTIVE, colors=32
             )
         )
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=160, loop=0, optimize=True)
