@@ -132,9 +132,8 @@ def vibration_spreads(lab: Lab) -> Finding:
     why = (
         "Measured are the height of the contour C0/10 above the frit's underside, how far upstream of the inlet the "
         "mean of the headspace reaches C0/100 and that of the bed C0/10, and the 10-90 width in the bed. Ordered as stated "
-        f"by more than 1 % are: {'; '.join(found) or 'none'}. A cycle leaves no trace in the developed state but a dispersion "
-        "of a few per cent of the diffusivity; the start-up drift of the headspace dies with about 0.7 s and had three of "
-        "these times by 1.925 s."
+        f"by more than 1 % are: {'; '.join(found) or 'none'}. In all other cases the larger vibration leaves the precursor as far or less "
+        "far spread. At 1.925 s the start-up drift of the headspace has had three of its decay times of 0.7 s."
     )
     return Finding(checks.verdict, measured, numbers, why)
 
