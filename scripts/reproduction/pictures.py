@@ -17,7 +17,7 @@ from PIL import Image
 from mpm.maps import OKABE_ITO, draw_ports, draw_zones, formula
 from mpm.plot import STYLE
 from mpm.results import Run
-from reproduction import cycle_rows, outlet_rows, zone_rows
+from reproduction import cycle_rows, outlet_rows, vibration_rows, zone_rows
 from reproduction.store import Lab
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ def strip_map(
 def concentrations(lab: Lab) -> Figure:
     """Figure 5.9: TMA at t = 1.925 s."""
     impulsive = {"fidelity": "resolved", "motion.startup": "impulsive"}
-    early = zone_rows.EARLY
+    early = vibration_rows.EARLY
     cases = [
         (
             f"Gamma {g:.2f}, 1.3 cm/s",
@@ -86,10 +86,10 @@ def box_means(lab: Lab) -> Figure:
     """Figure 5.10b: box mean of the coverage by Gamma (start-up) and by bed speed."""
     figure = Figure(figsize=(8.4, 3.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    for gamma in zone_rows.GAMMAS:
-        run = lab.run(zone_rows.pulse_case(lab, "coarse", "impulsive", "reactor", gamma))
+    for gamma in vibration_rows.GAMMAS:
+        run = lab.run(vibration_rows.pulse_case(lab, "coarse", "impulsive", "reactor", gamma))
         left.plot(run.history["time"], run.history["titration.tma.box_mean"], label=f"Gamma {gamma:.1f}")
-    for speed in zone_rows.SPEEDS:
+    for speed in vibration_rows.SPEEDS:
         run = lab.run(lab.case("zone", "light", {"motion.bed_velocity": speed}))
         right.plot(run.history["time"], run.history["titration.tma.box_mean"], label=speed)
     for panel, title in ((left, "start-up transient, 1.3 cm/s"), (right, "cycle mean, Gamma 0.30")):
