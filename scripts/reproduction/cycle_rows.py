@@ -209,9 +209,9 @@ def cvd_rates(lab: Lab) -> Finding:
         for w, n in numbers.items()
     )
     why = (
-        "With ports of 4.0 mm both doses exceed saturation; what is left over of both precursors makes the rate "
-        "climb to its final value without a maximum worth the name. With ports of 2.2 mm, where the doses just saturate, water that the bed cannot consume at first gives a "
-        "broad maximum, and the delay removes it."
+        "With ports of 4.0 mm both doses exceed saturation; what is left over of both precursors makes the rate climb to its "
+        "final value without a maximum worth the name. With ports of 2.2 mm, where the doses just saturate, water that the "
+        "bed cannot consume at first gives a broad maximum, and the delay removes it."
     )
     return Finding(checks.verdict, measured, numbers, why)
 
