@@ -158,6 +158,12 @@ class FlowProblem:
         self._own = own
         self._own_fixed = self._fixed[self._fixed < own]
 
+    def release(self) -> None:
+        """Give the factors' memory back; they are made anew when needed again. Collective."""
+        for solver in self._solvers.values():
+            solver.destroy()
+        self._solvers.clear()
+
     def _solver(self, kind: str) -> DirectSolver:
         if kind not in self._solvers:
             matrix = self.steady_matrix.copy()

@@ -48,6 +48,7 @@ class Replay:
             fields += periodic_flow(problem, bed, schedule.phases, watch)
         else:
             fields.append(steady_flow(problem, mean_motion(bed)))
+        problem.release()
         return cls(strip, fields, rests)
 
     def register(self, transport: Transport) -> None:

@@ -41,6 +41,11 @@ class DirectSolver:
         self.ksp.solve(rhs, solution)
         check(self.ksp, self.name)
 
+    def destroy(self) -> None:
+        """Free the matrix and its factor; collective."""
+        self.ksp.destroy()
+        self.matrix.destroy()
+
 
 class KrylovSolver:
     """BiCGStab with incomplete LU on each rank; the right choice for advection-diffusion-reaction with small steps."""
