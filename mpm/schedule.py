@@ -37,8 +37,8 @@ class Step:
 def aligned_step(step: float, column: float, speed: float) -> float:
     """The longest step up to `step` [s] that fits the bed's shifts: a whole number of steps per column, or of columns per step.
 
-    Every column then meets the gas of a cell for equally long; otherwise some would stay a step longer than their neighbours, and
-    the coverage would come out in stripes. A shift takes `column` / `speed` [m, m/s].
+    Every column then meets the gas of a cell for equally long, where otherwise some would stay a step longer than their neighbours.
+    A shift takes `column` / `speed` [m, m/s].
     """
     if speed <= 0.0:
         return step
