@@ -13,7 +13,12 @@ REASONS = {
 
 
 METIS = 5  # MUMPS: nested dissection; its own choice needs 1.8 times the memory here
-SPARE = 20  # MUMPS: per cent of spare workspace, because the saddle point pivots a lot
+SPARE = (
+    20,
+    100,
+    500,
+)  # MUMPS: per cent of spare workspace, tried in turn: pivoting can need more than was foreseen
+FACTOR_FAILED = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
 
 
 class DirectSolver:
@@ -23,22 +28,34 @@ class DirectSolver:
     """
 
     def __init__(self, matrix: PETSc.Mat, name: str, symmetric: bool = False):
-        self.name, self.matrix = name, matrix
-        self.ksp = PETSc.KSP().create(matrix.comm)
+        self.name, self.matrix, self.symmetric = name, matrix, symmetric
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
-        self.ksp.setOperators(matrix)
+        self._spare = 0
+        self._set_up()
+
+    def _set_up(self) -> None:
+        self.ksp = PETSc.KSP().create(self.matrix.comm)
+        self.ksp.setOperators(self.matrix)
         self.ksp.setType("preonly")
         pc = self.ksp.getPC()
-        pc.setType("cholesky" if symmetric else "lu")
+        pc.setType("cholesky" if self.symmetric else "lu")
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
         factor = pc.getFactorMatrix()
         factor.setMumpsIcntl(7, METIS)
-        factor.setMumpsIcntl(14, SPARE)
+        factor.setMumpsIcntl(14, SPARE[self._spare])
 
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solve for one right-hand side. Raises ConvergenceError when the factor or the solution is not usable."""
+        """Solve for one right-hand side. Raises ConvergenceError when the factor or the solution is not usable.
+
+        A factor for which the workspace was too small is made again with more.
+        """
         self.ksp.solve(rhs, solution)
+        while self.ksp.getConvergedReason() == FACTOR_FAILED and self._spare + 1 < len(SPARE):
+            self._spare += 1
+            self.ksp.destroy()
+            self._set_up()
+            self.ksp.solve(rhs, solution)
         check(self.ksp, self.name)
 
     def destroy(self) -> None:
