@@ -88,7 +88,7 @@ class StepMatrix:
     def solve(self, rhs: Floats, guess: Floats, residual: float) -> Floats:
         """BiCGStab from `guess` until the residual norm is below `residual` [mol/m/s]."""
         if self.krylov is None:
-            self.krylov = KrylovSolver(self.cells.matrix, self.name, 0.0)
+            self.krylov = KrylovSolver(self.cells.matrix, self.name, 0.0, fill=2)
             self.krylov.ksp.setTolerances(
                 rtol=1e-13, atol=residual / np.sqrt(max(self.cells.matrix.size[0], 1))
             )

@@ -229,7 +229,7 @@ class Reactor:
         slide = step_motion(self.motion, step.since, step.since + step.dt).slide if step.since >= 0.0 else 0.0
         self.bed.advance(slide)
         try:
-            self.transport.advance(number, step.t0, step.t1)
+            self.transport.advance(number, step.t0, step.dt)
         except ConvergenceError as error:
             self.bed.recall(memento)
             raise ConvergenceError(f"step {step.index + 1}: {error}") from error

@@ -32,10 +32,11 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 NEWTON_LIMIT = 30
-RESIDUAL = 1e-11  # sum of |residual| over all cells, relative to the largest feed
+REFACTORED = 2  # Newton iterations of a step with an incomplete factor of their own; afterwards the matrix hardly changes
+RESIDUAL = 1e-10  # sum of |residual| over all cells, relative to the largest feed
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
-FORCING = (1e-2, 1e-4)  # inner tolerance of the inexact Newton iteration: while the front settles, and after
-SETTLED = 3e-2  # residual below which Newton converges quadratically
+FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
+LAST = 0.1 * RESIDUAL  # what the inner tolerance aims at, and no further
 HALVINGS = 6
 
 
@@ -119,7 +120,7 @@ class Transport:
         ]
         if self.roles.coupled:
             self._jacobian = CellMatrix(strip, len(self.roles.coupled))
-            self._newton = KrylovSolver(self._jacobian.matrix, "reacting species", FORCING[0])
+            self._newton = KrylovSolver(self._jacobian.matrix, "reacting species", FORCING)
             self._step, self._rhs = self._jacobian.matrix.createVecs()
         self._jacobian_key: int | None = None
         self.iterations = 0
@@ -180,33 +181,31 @@ class Transport:
 
     # --- one step ---
 
-    def advance(self, number: int, t0: float, t1: float, halvings: int = 0) -> None:
-        """Advance concentrations, coverage and ledger from `t0` to `t1` [s] with velocity field `number`.
+    def advance(self, number: int, t0: float, dt: float, halvings: int = 0) -> None:
+        """Advance concentrations, coverage and ledger from `t0` by `dt` [s] with velocity field `number`.
 
         A step whose Newton iteration fails is halved, up to HALVINGS times. Raises ConvergenceError after that.
         """
         concentration, theta = self.concentration, self.bed.theta  # replaced, never changed in place
         try:
-            self._advance(number, t0, t1)
+            self._advance(number, t0, dt)
         except ConvergenceError as error:
             self.concentration, self.bed.theta = concentration, theta
             if halvings == HALVINGS:
-                raise ConvergenceError(f"t = {t0:.6g} s, step of {t1 - t0:.3g} s: {error}") from error
+                raise ConvergenceError(f"t = {t0:.6g} s, step of {dt:.3g} s: {error}") from error
             ledger = copy.deepcopy(self.ledger)
-            middle = 0.5 * (t0 + t1)
             try:
-                self.advance(number, t0, middle, halvings + 1)
-                self.advance(number, middle, t1, halvings + 1)
+                self.advance(number, t0, 0.5 * dt, halvings + 1)
+                self.advance(number, t0 + 0.5 * dt, 0.5 * dt, halvings + 1)
             except ConvergenceError:
                 self.concentration, self.bed.theta, self.ledger = concentration, theta, ledger
                 raise
 
-    def _advance(self, number: int, t0: float, t1: float) -> None:
-        dt = t1 - t0
+    def _advance(self, number: int, t0: float, dt: float) -> None:
         operators = self.operators(number)
         old, coupled = self.concentration, len(self.roles.coupled)
         drawn = self.outlet_means(operators, old)
-        shares = np.array([open_share(inlet, t0, t1) for inlet in self.case.geometry.inlets])
+        shares = np.array([open_share(inlet, t0, dt) for inlet in self.case.geometry.inlets])
         supply = self.supply(operators, shares, drawn)
         new = old.copy()
         theta = self.bed.theta
@@ -283,7 +282,7 @@ class Transport:
         new = old.copy()
         cells = self.bed.cells
         scale = max(self.feed_rate, 1e-300)
-        for _iteration in range(NEWTON_LIMIT):
+        for iteration in range(NEWTON_LIMIT):
             rates, slopes = self.surface.rates(new[:, cells], theta, dt)
             gas_rates, gas_slopes = self.gas.rates(new)
             source = (
@@ -309,7 +308,9 @@ class Transport:
                 blocks[:, i, i] += diagonal[i]
             self._jacobian.assemble(blocks)
             self._rhs.array[:] = residual.T.ravel()
-            self.iterations += self._newton.solve(self._rhs, self._step, FORCING[int(worst < SETTLED)])
+            self.iterations += self._newton.solve(
+                self._rhs, self._step, forcing(worst), refactor=iteration < REFACTORED
+            )
             new = new - self._step.array.reshape(own, b).T
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
@@ -345,10 +346,16 @@ class Transport:
                 ledger.back_volume[k] += dt * port.into.sum()
 
 
-def open_share(inlet: Inlet, t0: float, t1: float) -> float:
-    """Share of the step from `t0` to `t1` during which the inlet doses."""
-    dosing = sum(max(min(stop, t1) - max(start, t0), 0.0) for start, stop in inlet.windows)
-    return dosing / (t1 - t0)
+def forcing(residual: float) -> float:
+    """Inner tolerance that keeps Newton's quadratic convergence (Eisenstat and Walker 1996, choice 2 in spirit): the next residual is
+    about the square of this one in any case, and nothing is gained below LAST."""
+    return min(max(0.3 * residual, LAST / residual), FORCING)
+
+
+def open_share(inlet: Inlet, t0: float, dt: float) -> float:
+    """Share of the step of `dt` from `t0` [s] during which the inlet doses."""
+    dosing = sum(max(min(stop, t0 + dt) - max(start, t0), 0.0) for start, stop in inlet.windows)
+    return min(dosing / dt, 1.0)
 
 
 def stays_open(inlet: Inlet) -> float:
