@@ -99,23 +99,30 @@ def periodic_flow(
         float(np.mean([m.frame_velocity_y for m in motions])),
         0.0,
     )
-    previous: list[Floats] = []
+    fields: list[
+        FlowField
+    ] = []  # of the last cycle; the next one takes their places, because two would be much to hold
     for cycle in range(CYCLE_LIMIT):
-        fields: list[FlowField] = []
         convective_mean = problem.convective_force().duplicate()
         state_mean = np.zeros_like(problem.state.x.array)
-        for motion in motions:
+        change = speed = 0.0
+        for phase, motion in enumerate(motions):
             force = problem.convective_force()
             convective_mean.axpy(1.0 / phases, force)
             problem.step(motion, force)
             state_mean += problem.state.x.array / phases
-            fields.append(FlowField.of(problem))
-        change = _change(problem, previous, fields)
+            field = FlowField.of(problem)
+            speed = max(speed, np.abs(field.velocities).max(initial=0.0))
+            if cycle == 0:
+                fields.append(field)
+                continue
+            change = max(change, np.abs(field.velocities - fields[phase].velocities).max(initial=0.0))
+            fields[phase] = field
+        change = _relative(problem, change, speed) if cycle else np.inf
         if watch is not None:
             watch(cycle, change)
         if change < PERIODIC:
             return fields
-        previous = [f.velocities for f in fields]
         last = problem.state.x.array.copy()
         problem.state.x.array[:] = state_mean
         residual, _ = problem.steady_residual(mean, convective_mean)
@@ -127,11 +134,7 @@ def periodic_flow(
     )
 
 
-def _change(problem: FlowProblem, previous: list[Floats], fields: list[FlowField]) -> float:
-    """Largest change of a velocity since the cycle before, over the largest velocity."""
-    if not previous:
-        return float("inf")
-    change = max(np.abs(f.velocities - p).max(initial=0.0) for f, p in zip(fields, previous, strict=True))
-    speed = max(np.abs(f.velocities).max(initial=0.0) for f in fields)
+def _relative(problem: FlowProblem, change: float, speed: float) -> float:
+    """Largest `change` of a velocity since the cycle before on any rank, over the largest `speed`."""
     change, speed = largest(problem.strip.comm, [change, speed])
     return float(change / speed) if speed > 0.0 else 0.0

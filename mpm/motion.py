@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from mpm.constants import GRAVITY
 from mpm.errors import InputError
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
+BISECTIONS = 60  # to the last digit; scipy.optimize would cost every rank 50 MB
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,11 @@ def thesis_phases(vibration: Vibration, liftoff_velocity: float) -> tuple[float,
 
     # the reactor turns upwards and overtakes the bed within one turn of lift-off: gap opens, then closes once
     lowest = TURN - np.arccos(slope)  # reactor's upward-going instant of equal velocity: largest gap
-    contact = float(brentq(gap, lowest, liftoff + TURN, xtol=1e-14))
+    before, after = lowest, liftoff + TURN
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (before + after)
+        before, after = (middle, after) if gap(middle) > 0.0 else (before, middle)
+    contact = float(after)
     return liftoff, contact % TURN
 
 

@@ -14,6 +14,7 @@ REASONS = {
 
 METIS = 5  # MUMPS: nested dissection; its own choice needs 1.8 times the memory here
 SPARE = (
+    5,
     20,
     100,
     500,
@@ -65,9 +66,12 @@ class DirectSolver:
 
 
 class KrylovSolver:
-    """BiCGStab with incomplete LU on each rank; the right choice for advection-diffusion-reaction with small steps."""
+    """BiCGStab with incomplete LU on each rank; the right choice for advection-diffusion-reaction with small steps.
 
-    def __init__(self, matrix: PETSc.Mat, name: str, tolerance: float, iterations: int = 200):
+    `fill` levels of fill-in pay for themselves where one factor serves many solves; the matrix must be assembled by then.
+    """
+
+    def __init__(self, matrix: PETSc.Mat, name: str, tolerance: float, iterations: int = 200, fill: int = 0):
         self.name = name
         self.ksp = PETSc.KSP().create(matrix.comm)
         self.ksp.setOperators(matrix)
@@ -76,15 +80,29 @@ class KrylovSolver:
         pc = self.ksp.getPC()
         if matrix.comm.size == 1:
             pc.setType("ilu")
+            pc.setFactorLevels(fill)
         else:
             pc.setType("bjacobi")  # its default block solver is ILU(0)
+            if fill:
+                self.ksp.setUp()
+                for block in pc.getBJacobiSubKSP():
+                    block.getPC().setFactorLevels(fill)
 
     def solve(
-        self, rhs: PETSc.Vec, solution: PETSc.Vec, tolerance: float | None = None, guess: bool = False
+        self,
+        rhs: PETSc.Vec,
+        solution: PETSc.Vec,
+        tolerance: float | None = None,
+        guess: bool = False,
+        refactor: bool = True,
     ) -> int:
-        """Solve to the relative `tolerance`; returns the number of iterations. Raises ConvergenceError."""
+        """Solve to the relative `tolerance`; returns the number of iterations. Raises ConvergenceError.
+
+        Without `refactor` the incomplete factor of an earlier matrix goes on serving as the preconditioner.
+        """
         if tolerance is not None:
             self.ksp.rtol = tolerance
+        self.ksp.getPC().setReusePreconditioner(not refactor)
         self.ksp.setInitialGuessNonzero(guess)
         self.ksp.solve(rhs, solution)
         check(self.ksp, self.name)
