@@ -42,6 +42,8 @@ class CellMatrix:
         )
         self.count = b * (len(rows_behind) + len(rows_ahead))
         self.values = np.zeros(self.count + own * b * b)
+        self._diagonal = self.matrix.createVecLeft() if b == 1 else None
+        self._holds_fluxes = False
         self._diagonal_faces = (rows_behind, rows_ahead)
 
     def set_fluxes(self, operators: list[FluxOperator]) -> Floats:
@@ -58,12 +60,18 @@ class CellMatrix:
         self.values[: self.count] = np.concatenate(
             [-op.b[behind] for op in operators] + [-op.a[ahead] for op in operators]
         )
+        self._holds_fluxes = False
         return np.stack([diagonals[id(op)] for op in operators])
 
     def assemble(self, blocks: Floats) -> None:
-        """Set the diagonal blocks (own, b, b) and assemble."""
+        """Set the diagonal blocks (own, b, b) and assemble; of one unknown per cell only the diagonal is entered anew."""
+        if self._diagonal is not None and self._holds_fluxes:
+            self._diagonal.array[:] = blocks.ravel()
+            self.matrix.setDiagonal(self._diagonal)
+            return
         self.values[self.count :] = blocks.ravel()
         self.matrix.setValuesCOO(self.values)
+        self._holds_fluxes = True
 
 
 class StepMatrix:

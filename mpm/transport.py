@@ -296,17 +296,12 @@ class Transport:
                 return new, rates, gas_rates
             if not np.isfinite(worst):
                 break
-            blocks = np.zeros((own, b, b))
+            blocks = np.zeros((b, b, own))
             if len(gas_rates):
-                blocks -= (
-                    np.einsum("ri,rjn->nij", self.nu_gas[:, :b], gas_slopes) * self.gas_volume[:, None, None]
-                )
-            blocks[cells] -= (
-                np.einsum("ri,rjn->nij", self.nu_surface[:, :b], slopes) * self.active_area[:, None, None]
-            )
-            for i in range(b):
-                blocks[:, i, i] += diagonal[i]
-            self._jacobian.assemble(blocks)
+                blocks -= np.einsum("ri,rjn->ijn", self.nu_gas[:, :b], gas_slopes) * self.gas_volume
+            blocks[:, :, cells] -= np.einsum("ri,rjn->ijn", self.nu_surface[:, :b], slopes) * self.active_area
+            blocks[range(b), range(b)] += diagonal
+            self._jacobian.assemble(np.moveaxis(blocks, 2, 0))
             self._rhs.array[:] = residual.T.ravel()
             self.iterations += self._newton.solve(
                 self._rhs, self._step, forcing(worst), refactor=iteration < REFACTORED
