@@ -1,13 +1,9 @@
 """Quasi-steady state of gas and coverage in one nonlinear solve (fidelity = "steady").
 
-    div(u C_i - D_i^eff grad C_i) = eps R_i^gas + S sum_r nu_ir r_r            cycle-mean velocity u
-    n_s v_s dtheta/dx = n_s Q(C) theta     in the moving layer, from fresh or periodic solids
-    0 = Q(C) theta                         in layers at rest
-
-The coverage is integrated exactly along the bed: solids that cross a cell of width h at its concentration leave with
-theta_out = theta_in exp(-nu_s k C h/(v_s n_s)) (one reaction; `SurfaceKinetics.conveyed` for two). Unknowns are the concentrations of the
-reacting species and theta_out of every moving cell. Newton's method on the whole system with a sparse LU factor, by continuation in
-the surface rates from a start in pseudo-time.
+Newton's method with a sparse LU factor on the system of `mpm.steady_system`. Each of its steps ends with a balance of every cell by itself
+(`mpm.cellbalance`), without which a front thinner than a cell hardly moves. Large meshes start from the steady state of a coarser one
+(`mpm.coarsening`), others from the gas and the solids of the case. Where Newton's method does not find the state from there, pseudo-time
+of growing steps does.
 """
 
 from __future__ import annotations
@@ -18,31 +14,33 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.cellmatrix import CellMatrix
+from mpm.cellbalance import balance_cells
+from mpm.coarsening import coarser, prolong
 from mpm.errors import ConvergenceError
-from mpm.fem import PETSc
 from mpm.parallel import largest, total
+from mpm.replay import Replay
 from mpm.solvers import DirectSolver
-from mpm.transport import stays_open
+from mpm.steady_system import LAST_STEP, SteadySystem
 
 if TYPE_CHECKING:
     from mpm.reactor import Reactor
 
 Floats = NDArray[np.float64]
-SOFT = 1e-4  # factor on the surface rate constants with which the continuation starts: fronts as wide as some cells
-FIRST_STEP, LAST_STEP = 1.0, 1e12  # s, pseudo-time steps; a storage term over the last one is below rounding
-SETTLED = 0.05  # residual over feed at which the continuation goes on
-CONVERGED, ROUNDING = (
-    1e-11,
-    1e-10,
-)  # of the largest feed: sum of |residual|; the second is accepted when nothing improves any more
-TRIES, LAST_TRIES = 12, 60  # Newton iterations per stage and for the last one
-FINEST = 1.03  # smallest factor of the continuation
-SHORTEST = 1.0 / 64.0  # of a Newton step, in the line search
+CONVERGED = 1e-11  # sum of |residual| over the largest feed
+ROUNDING = 1e-10  # accepted when nothing improves any more
+TRIES = 50  # Newton steps from the first guess
+STEP_TRIES = 15  # and per step of pseudo-time
+DAMPED = 0.5  # share of a Newton step that is taken when the one before made things worse: two iterates may follow each other for ever
+SETTLED = 0.01  # residual at which pseudo-time goes on
+FIRST_STEP, SHORTEST_STEP = 1.0, 1e-6  # s, pseudo-time
+FAR = 1e4  # s, pseudo-time from which the steps grow by as much
 
 
-class SteadyProblem:
-    """Residual and Jacobian of the quasi-steady system on the flow field `number` of the reactor's transport."""
+class SteadyProblem(SteadySystem):
+    """The steady system of a reactor on its flow field `number`, and how it is solved.
+
+    `watch(iteration, residual)` is called after every Newton step; `iterations` counts those on this mesh.
+    """
 
     def __init__(
         self,
@@ -50,255 +48,124 @@ class SteadyProblem:
         number: int,
         watch: Callable[[int, float], None] = lambda iteration, residual: None,
     ):
-        self.watch = watch
-        self.transport, self.bed, self.strip = reactor.transport, reactor.bed, reactor.strip
-        transport, bed, strip = self.transport, self.bed, self.strip
-        self.b, self.own = len(transport.roles.coupled), strip.owned
-        self.kinds = len(bed.theta)
-        self.free = self.kinds - 1  # independent coverages of a moving cell
-        velocity = reactor.motion.mean
-        moving_rows = set(bed.moving_rows) if velocity > 0.0 else set()
-        self.is_moving = np.array([place in moving_rows for place in bed.place], dtype=bool).reshape(
-            len(bed.cells)
-        )
-        self.moving, self.resting = np.flatnonzero(self.is_moving), np.flatnonzero(~self.is_moving)
-        self.residence = strip.grid.dx / velocity if velocity > 0.0 else np.inf
-        self.periodic = bed.periodic
-        self.operators = transport.operators(number)
-        self.cells = CellMatrix(strip, self.b)
-        self.diagonal = self.cells.set_fluxes(self.operators[: self.b])
-        self._number_unknowns()
-        self.theta = bed.theta.copy()  # leaving coverage where moving, own coverage where at rest
-        self.concentration = transport.concentration[: self.b].copy()
-        self.old = (self.concentration.copy(), self.theta.copy())
+        super().__init__(reactor, number)
+        self.reactor, self.watch = reactor, watch
         self.iterations = 0
-        self.shares = np.array([stays_open(inlet) for inlet in transport.case.geometry.inlets])
-        self._flux = PETSc.Mat().create(strip.comm)  # the gas rows without reactions
         self._solver: DirectSolver | None = None
+        self._trouble: ConvergenceError | None = None  # of the last linear system
 
-    def _number_unknowns(self) -> None:
-        """Gas unknowns cell by cell, then the coverages of moving cells; both contiguous on each rank."""
-        comm, bed, strip = self.strip.comm, self.bed, self.strip
-        local = self.b * self.own + self.free * len(self.moving)
-        first = int(comm.scan(local)) - local
-        self.local, self.first = local, first
-        sizes = comm.allgather((first, strip.owned))
-        # global number of the first gas unknown of any cell, from its PETSc cell number
-        starts = np.cumsum([0] + [owned for _, owned in sizes])[:-1]
-        owner = np.searchsorted(starts, strip.global_cell, side="right") - 1
-        firsts = np.array([f for f, _ in sizes])
-        self.gas_number = firsts[owner] + self.b * (strip.global_cell - starts[owner])
-        mine = np.full(len(bed.cells), -1.0)
-        mine[self.moving] = first + self.b * self.own + self.free * np.arange(len(self.moving))
-        everyone = bed.scatter.to_all(mine).reshape(len(bed.rows), bed.columns).astype(np.int64)
-        self.theta_number = first + self.b * self.own + self.free * np.arange(len(self.moving))
-        rows, columns = bed.place[self.moving], strip.column[bed.cells[self.moving]]
-        before = everyone[rows, columns - 1]
-        self.upstream = np.where((columns > 0) | self.periodic, before, -1)
-        self.column = columns
+    def solve(self) -> None:
+        """Find the quasi-steady state. Raises ConvergenceError; the last iterate is kept."""
+        self._start_from_coarser()
+        start = self.concentration, self.theta
+        if not self._relax(LAST_STEP, TRIES):
+            self.concentration, self.theta = start
+            self._pseudo_time()
 
-    def incoming(self) -> Floats:
-        """Coverage of the solids entering every own moving cell, (sites, moving)."""
-        whole = self.bed.scatter.to_all(self.theta).reshape(self.kinds, len(self.bed.rows), self.bed.columns)
-        rows = self.bed.place[self.moving]
-        entering = whole[:, rows, self.column - 1]
-        fresh = self.bed.fresh[:, rows]
-        return np.where(self.upstream >= 0, entering, fresh)
-
-    def residual(self, step: float) -> tuple[Floats, Floats, dict]:
-        """Gas residual (b, own) [mol/m/s], coverage residual (free, moving), and what the Jacobian needs."""
-        transport, bed = self.transport, self.bed
-        c, cells = self.concentration, bed.cells
-        old_c, old_theta = self.old
-        coupled = self.operators[: self.b]
-        supply = transport.supply(coupled, self.shares, transport.outlet_means(coupled, c))
-        gas_rates, gas_slopes = transport.gas.rates(c)
-        source = transport.nu_gas[:, : self.b].T @ gas_rates * transport.gas_volume
-        # moving cells: the storage of a pseudo-time step is one more stream of sites, of age `step`
-        span = 1.0 / (1.0 / step + 1.0 / self.residence)
-        entering = span / self.residence * self.incoming() + span / step * old_theta[:, self.moving]
-        at_rest = transport.surface.part(self.resting).rates(
-            c[:, cells[self.resting]], old_theta[:, self.resting], step
-        )
-        conveyed = transport.surface.part(self.moving).conveyed(c[:, cells[self.moving]], entering, span)
-        rates = np.zeros((len(transport.surface.reactions), len(cells)))
-        rates[:, self.resting], rates[:, self.moving] = at_rest[0], conveyed.rates
-        source[:, cells] += (transport.nu_surface[:, : self.b].T @ rates) * transport.active_area
-        gas = transport.flux_product(coupled, c) - supply - source
-        gas += transport.gas_volume * (c - old_c) / step
-        coverage = (self.theta[:, self.moving] - conveyed.out)[: self.free]
-        parts = {
-            "rates": rates,
-            "gas_rates": gas_rates,
-            "gas_slopes": gas_slopes,
-            "rest_slopes": at_rest[1],
-            "conveyed": conveyed,
-            "share": span / self.residence,
-        }
-        return gas, coverage, parts
-
-    def jacobian(self, step: float, parts: dict) -> PETSc.Mat:
-        """The matrix of the linear system for all unknowns."""
-        transport, b, free = self.transport, self.b, self.free
-        cells, area = self.bed.cells, transport.active_area
-        nu = transport.nu_surface[:, :b]
-        blocks = np.zeros((self.own, b, b))
-        if len(transport.gas.reactions):
-            blocks -= (
-                np.einsum("ri,rjn->nij", transport.nu_gas[:, :b], parts["gas_slopes"])
-                * transport.gas_volume[:, None, None]
-            )
-        slopes = np.zeros((len(transport.surface.reactions), b, len(cells)))
-        slopes[:, :, self.resting], slopes[:, :, self.moving] = (
-            parts["rest_slopes"],
-            parts["conveyed"].rates_c,
-        )
-        blocks[cells] -= np.einsum("ri,rjn->nij", nu, slopes) * area[:, None, None]
-        for i in range(b):
-            blocks[:, i, i] += self.diagonal[i] + transport.gas_volume / step
-        conveyed, share = parts["conveyed"], parts["share"]
-        last = self.kinds - 1
-        by_theta = (
-            conveyed.rates_theta[:, :last] - conveyed.rates_theta[:, last:]
-        ) * share  # (reactions, free, moving)
-        gas_theta = -np.einsum("ri,rkn->nik", nu, by_theta) * area[self.moving][:, None, None]
-        theta_c = -np.moveaxis(conveyed.out_c[:free], -1, 0)  # (moving, free, b)
-        theta_theta = -np.moveaxis(
-            (conveyed.out_theta[:free, :last] - conveyed.out_theta[:free, last:]) * share, -1, 0
-        )
-        linked = self.upstream >= 0
-        values = [
-            self.cells.values[: self.cells.count],
-            blocks.ravel(),
-            gas_theta[linked].ravel(),
-            theta_c.ravel(),
-            theta_theta[linked].ravel(),
-            np.ones(free * len(self.moving)),
-        ]
-        if self._solver is None:
-            self._flux.setSizes(((self.local, None), (self.local, None)))
-            self._flux.setType("aij")
-            rows, columns = self._pattern(linked)
-            self._flux.setPreallocationCOO(rows.astype(PETSc.IntType), columns.astype(PETSc.IntType))
-        self._flux.setValuesCOO(np.concatenate(values))
-        return self._flux
-
-    def _pattern(self, linked: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Rows and columns of the entries in the order of `jacobian`."""
-        b, free = self.b, self.free
-        faces = self.strip.faces
-        ahead_of, behind_of = self.cells.from_behind, self.cells.from_ahead
-        rows, columns = [], []
-        for mine, other in (
-            (faces.behind[ahead_of], faces.ahead[ahead_of]),
-            (faces.ahead[behind_of], faces.behind[behind_of]),
-        ):
-            for k in range(b):
-                rows.append(self.gas_number[mine] + k)
-                columns.append(self.gas_number[other] + k)
-
-        def block(row: NDArray[np.int64], n: int, column: NDArray[np.int64], m: int) -> None:
-            i, j = np.divmod(np.arange(n * m), m)
-            rows.append((row[:, None] + i).ravel())
-            columns.append((column[:, None] + j).ravel())
-
-        own = self.gas_number[: self.own]
-        cell = self.gas_number[self.bed.cells[self.moving]]
-        block(own, b, own, b)
-        block(cell[linked], b, self.upstream[linked], free)
-        block(self.theta_number, free, cell, b)
-        block(self.theta_number[linked], free, self.upstream[linked], free)
-        diagonal = (self.theta_number[:, None] + np.arange(free)).ravel()
-        rows.append(diagonal)
-        columns.append(diagonal)
-        return np.concatenate(rows), np.concatenate(columns)
-
-    def newton(self, step: float) -> float:
+    def newton(self, step: float, share: float = 1.0) -> float:
         """One Newton step at pseudo-time step `step` [s]; returns the residual after it, relative to the feed.
 
-        Only the concentrations are taken from the linear system; the coverage follows them exactly by `sweep`, which keeps it physical.
-        The step is halved until the residual falls; when it never does, the best one is taken.
+        The linear system gives the inflow of every cell and the coverage with which solids enter it. Concentrations follow from the
+        balance of each cell with these, coverages from the concentrations by `sweep`; both stay physical, however long the step.
         """
         gas, coverage, parts = self.residual(step)
-        before = self.size(gas, coverage)
         matrix = self.jacobian(step, parts)
         if self._solver is None:
             self._solver = DirectSolver(matrix, "steady state")
             self._x, self._y = matrix.createVecs()
         self._y.array[:] = np.concatenate([gas.T.ravel(), coverage.T.ravel()])
         self._solver.solve(self._y, self._x)
-        change = self._x.array[: self.b * self.own].reshape(self.own, self.b).T
-        start, share = self.concentration, 1.0
-        best = (np.inf, self.concentration, self.theta)
-        while True:
-            self.concentration = start - share * change
-            self.sweep(step)
-            after = self.size(*self.residual(step)[:2])
-            if after < best[0]:
-                best = (after, self.concentration, self.theta)
-            if after < before or share <= SHORTEST:
-                break
-            share *= 0.5
-        after, self.concentration, self.theta = best
+        split = self.b * self.own
+        predicted = self.concentration - share * self._x.array[:split].reshape(self.own, self.b).T
+        leaving = (
+            self.theta[: self.free, self.moving] - share * self._x.array[split:].reshape(-1, self.free).T
+        )
+        leaving = np.clip(leaving, 0.0, 1.0)
+        leaving = np.vstack([leaving, np.maximum(1.0 - leaving.sum(axis=0), 0.0)])
+        self.theta = self.theta.copy()
+        self.theta[:, self.moving] = leaving / leaving.sum(axis=0)
+        balance_cells(self, predicted, step)
+        self.sweep(step)
         self.iterations += 1
-        return after
+        return self.size(*self.residual(step)[:2])
 
-    def relax(self, step: float, tries: int, target: float) -> float:
-        """Newton steps until the residual is below `target`; returns the last one."""
-        worst = np.inf
+    def _relax(self, step: float, tries: int, target: float = CONVERGED) -> bool:
+        """Newton steps until the residual is below `target`; False when `tries` are not enough."""
+        worst, share = np.inf, 1.0
         for _ in range(tries):
-            worst = self.newton(step)
-            self.watch(self.iterations, worst)
-            if worst < target or not np.isfinite(worst):
-                break
-        return worst
-
-    def keep(self) -> None:
-        """Make the present state the one that pseudo-time storage refers to."""
-        self.old = (self.concentration, self.theta)
-
-    def recall(self) -> None:
-        self.concentration, self.theta = self.old
-
-    def solve(self) -> None:
-        """Find the quasi-steady state from any start. Raises ConvergenceError; the last iterate is kept.
-
-        Surface reactions are so fast that their fronts are thinner than a cell, and Newton's method cannot see a front it has to move.
-        So they are slowed down first: pseudo-time of growing steps brings the wide fronts to rest, then the rate constants are raised to
-        their true values in factors that adapt to what converges.
-        """
-        surface = self.transport.surface
-        true = surface.constant
-        try:
-            surface.constant = [SOFT * k for k in true]
-            self._pseudo_time()
-            softness, factor = SOFT, 3.0
-            while softness < 1.0:
-                trial = min(softness * factor, 1.0)
-                surface.constant = [trial * k for k in true]
-                self.sweep(LAST_STEP)
-                if self._finish() if trial == 1.0 else self.relax(LAST_STEP, TRIES, SETTLED) < SETTLED:
-                    softness, factor = trial, min(1.5 * factor, 10.0)
-                    self.keep()
-                    continue
-                if factor < FINEST:
-                    raise self._failure(f"with surface rates at {trial:.3g} of their values", LAST_STEP)
-                self.recall()
-                factor = np.sqrt(factor)
-        finally:
-            surface.constant = true
-
-    def _finish(self) -> bool:
-        """Converge at the true rates; False when that stalls."""
-        worst = np.inf
-        for attempt in range(LAST_TRIES):
-            last, worst = worst, self.newton(LAST_STEP)
-            self.watch(self.iterations, worst)
-            if worst < CONVERGED or (worst < ROUNDING and worst > 0.5 * last):
-                return True
-            if attempt >= TRIES and worst > SETTLED:
+            last = worst
+            try:
+                worst = self.newton(step, share)
+            except ConvergenceError as error:
+                self._trouble = error
                 return False
+            self.watch(self.iterations, worst)
+            if worst < target or (worst < ROUNDING and worst > 0.5 * last):
+                return True
+            share = 1.0 if worst < last else DAMPED
         return False
+
+    def _pseudo_time(self) -> None:
+        """March from the present state to rest with steps that grow as long as each converges. Raises ConvergenceError.
+
+        Solids that come back approach their steady coverage over many turns, when two equal doses work against each other; that is slow
+        in time and far for Newton's method, but easy for long implicit steps.
+        """
+        step = FIRST_STEP
+        self.old = self.concentration, self.theta
+        while True:
+            last = step >= LAST_STEP
+            if self._relax(step, STEP_TRIES, CONVERGED if last else SETTLED):
+                if last:
+                    return
+                self.old = self.concentration, self.theta
+                step = min((10.0 if step < FAR else FAR) * step, LAST_STEP)
+            else:
+                step /= 20.0
+                if step < SHORTEST_STEP:
+                    raise self._failure(step) from self._trouble
+                self.concentration, self.theta = self.old
+
+    def _start_from_coarser(self) -> None:
+        """Take over the steady state of a coarser mesh where that saves work; without one, the present state stays the first guess."""
+        case = coarser(self.transport.case)
+        if case is None:
+            return
+        reactor = type(self.reactor)(case, self.strip.comm)
+        reactor.flows = Replay.solve(case, reactor.strip, reactor.motion, reactor.schedule, None)
+        reactor.flows.register(reactor.transport)
+        problem = SteadyProblem(reactor, 0, self.watch)
+        try:
+            problem.solve()
+            prolong(problem, self)
+            self.old = self.concentration, self.theta
+            self.sweep(LAST_STEP)
+        except ConvergenceError:
+            pass  # a first guess is not worth an error
+        finally:
+            problem.release()
+
+    def release(self) -> None:
+        """Free the factor; collective."""
+        if self._solver is not None:
+            self._solver.destroy()
+            self._solver = None
+
+    def _failure(self, step: float) -> ConvergenceError:
+        """Says which cell is worst."""
+        gas, coverage, _ = self.residual(step)
+        share = np.abs(gas).sum(axis=0)
+        worst = largest(self.strip.comm, [share.max(initial=0.0)])[0]
+        cell = int(np.argmax(share)) if len(share) and share.max() == worst else -1
+        here = int(largest(self.strip.comm, [float(self.strip.cell[cell]) if cell >= 0 else -1.0])[0])
+        grid = self.strip.grid
+        row, column = divmod(here, grid.columns)
+        x, y = 0.5 * (grid.x[column] + grid.x[column + 1]), 0.5 * (grid.y[row] + grid.y[row + 1])
+        return ConvergenceError(
+            f"steady state: Newton stopped after {self.iterations} iterations, at a pseudo-time step of {step:.2g} s, at a residual of "
+            f"{self.size(gas, coverage):.3g} of the feed, worst at x = {1e3 * x:.2f} mm, y = {1e3 * y:.2f} mm; "
+            f"the last iterate is kept; try fidelity averaged"
+        )
 
     def settle_accounts(self) -> None:
         """Hand the state to the reactor's transport and bed, solve the species that are only made, and book one second of it."""
@@ -325,97 +192,3 @@ class SteadyProblem:
             carried = bed.capacity[self.moving] / self.residence
             gone = self.theta[:, self.moving][:, last] @ carried[last] - entering[:, first] @ carried[first]
             bed.passed = total(self.strip.comm, gone)
-
-    def _pseudo_time(self) -> None:
-        """March the slowed-down system to rest with growing steps."""
-        step, shortest = FIRST_STEP, 1e-6
-        while True:
-            if self.relax(step, TRIES, SETTLED) < SETTLED:
-                self.keep()
-                if step >= LAST_STEP:
-                    return
-                step = min((10.0 if step < 1e4 else 1e4) * step, LAST_STEP)
-            else:
-                self.recall()
-                step /= 20.0
-                if step < shortest:
-                    raise self._failure("in pseudo-time", step)
-
-    def _failure(self, where: str, step: float) -> ConvergenceError:
-        """Says which cell is worst."""
-        gas, coverage, _ = self.residual(step)
-        share = np.abs(gas).sum(axis=0)
-        worst = largest(self.strip.comm, [share.max(initial=0.0)])[0]
-        cell = int(np.argmax(share)) if len(share) and share.max() == worst else -1
-        here = int(largest(self.strip.comm, [float(self.strip.cell[cell]) if cell >= 0 else -1.0])[0])
-        grid = self.strip.grid
-        row, column = divmod(here, grid.columns)
-        x, y = 0.5 * (grid.x[column] + grid.x[column + 1]), 0.5 * (grid.y[row] + grid.y[row + 1])
-        return ConvergenceError(
-            f"steady state: Newton stopped {where} after {self.iterations} iterations at a residual of {self.size(gas, coverage):.3g} of "
-            f"the feed, worst at x = {1e3 * x:.2f} mm, y = {1e3 * y:.2f} mm; the last iterate is kept; try fidelity averaged"
-        )
-
-    def sweep(self, step: float) -> None:
-        """Carry the solids along the bed at the present concentrations: theta_out of every cell from the one before it.
-
-        In every cell theta_out = M theta_in with a stochastic M, so the coverage stays within [0, 1]. Periodic solids come in as they
-        left: the fixed point of the product of all M.
-        """
-        bed, surface, k = self.bed, self.transport.surface, self.kinds
-        chosen = self.bed.cells[self.moving]
-        span = 1.0 / (1.0 / step + 1.0 / self.residence)
-        share = span / self.residence
-        part = surface.part(self.moving)
-        c = self.concentration[:, chosen]
-        columns = [
-            part.conveyed(c, np.repeat(e[:, None], len(self.moving), axis=1), span).out for e in np.eye(k)
-        ]
-        local = np.zeros((k * k + k, len(bed.cells)))
-        local[: k * k, self.moving] = np.concatenate(columns)  # column by column
-        local[k * k :, self.moving] = self.old[1][:, self.moving]
-        whole = bed.scatter.to_all(local).reshape(-1, len(bed.rows), bed.columns)[:, bed.moving_rows]
-        m = np.moveaxis(
-            whole[: k * k].reshape(k, k, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0)
-        )  # (columns, rows, out, in)
-        aged = (1.0 - share) * np.moveaxis(whole[k * k :], (0, 1, 2), (2, 1, 0))  # (columns, rows, sites)
-        incoming = bed.fresh[:, bed.moving_rows].T
-        if self.periodic:
-            incoming = _fixed_point(m, aged, share, incoming)
-        theta = np.empty_like(aged)
-        for j in range(len(m)):
-            incoming = np.einsum("roi,ri->ro", m[j], share * incoming + aged[j])
-            incoming = np.maximum(incoming, 0.0)
-            incoming = theta[j] = incoming / incoming.sum(
-                axis=1, keepdims=True
-            )  # rounding would add up along the bed
-        result = np.zeros((k, len(bed.rows), bed.columns))
-        result[:, bed.moving_rows] = np.moveaxis(theta, (0, 1, 2), (2, 1, 0))
-        new = self.theta.copy()
-        new[:, self.moving] = bed.scatter.to_local(result.reshape(k, -1))[:, self.moving]
-        self.theta = new
-
-    def size(self, gas: Floats, coverage: Floats) -> float:
-        """Sum of |gas residual| plus that of the coverage in sites per second, over the largest feed."""
-        sites = (
-            np.abs(coverage) @ self.bed.capacity[self.moving] / self.residence
-            if len(self.moving)
-            else np.zeros(1)
-        )
-        parts = total(self.strip.comm, [np.abs(gas).sum(), sites.sum()])
-        return float(parts.sum() / max(self.transport.feed_rate, 1e-300))
-
-
-def _fixed_point(m: Floats, aged: Floats, share: float, start: Floats) -> Floats:
-    """Coverage (rows, sites) that the solids bring back after one turn: theta = A theta + c of all columns together."""
-    k = m.shape[-1]
-    a = np.broadcast_to(np.eye(k), m.shape[1:]).copy()
-    c = np.zeros(m.shape[1:3])
-    for j in range(len(m)):
-        a = share * m[j] @ a
-        c = np.einsum("roi,ri->ro", m[j], share * c + aged[j])
-    theta = start
-    for row in range(len(a)):
-        gap = np.eye(k) - a[row]
-        theta[row] = np.linalg.lstsq(np.vstack([gap, np.ones(k)]), np.append(c[row], 1.0))[0]
-    return theta

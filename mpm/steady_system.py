@@ -1,0 +1,272 @@
+"""The quasi-steady system: what gas and coverage must satisfy once nothing changes any more.
+
+    div(u C_i - D_i^eff grad C_i) = eps R_i^gas + S sum_r nu_ir r_r            cycle-mean velocity u
+    n_s v_s dtheta/dx = n_s Q(C) theta     in the moving layer, from fresh or periodic solids
+    0 = Q(C) theta                         in layers at rest
+
+The coverage is integrated exactly along the bed: solids that cross a cell of width h at its concentration leave with
+theta_out = theta_in exp(-nu_s k C h/(v_s n_s)) (one reaction; `SurfaceKinetics.conveyed` for two). Unknowns are the concentrations of the
+reacting species and theta_out of every moving cell. A storage term over a pseudo-time step [s] can be added; over LAST_STEP it is
+below rounding.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.cellmatrix import CellMatrix
+from mpm.fem import PETSc
+from mpm.parallel import total
+from mpm.transport import stays_open
+
+if TYPE_CHECKING:
+    from mpm.reactor import Reactor
+
+Floats = NDArray[np.float64]
+LAST_STEP = 1e12  # s, a pseudo-time step so long that storage over it is below rounding
+
+
+class SteadySystem:
+    """Residual and Jacobian on the flow field `number` of the reactor's transport, and the coverage that follows from concentrations.
+
+    `concentration` (coupled, own cells) [mol/m3]; `theta` (sites, reactive cells): leaving coverage where moving, own coverage at rest.
+    """
+
+    def __init__(self, reactor: Reactor, number: int):
+        self.transport, self.bed, self.strip = reactor.transport, reactor.bed, reactor.strip
+        transport, bed, strip = self.transport, self.bed, self.strip
+        self.b, self.own = len(transport.roles.coupled), strip.owned
+        self.kinds = len(bed.theta)
+        self.free = self.kinds - 1  # independent coverages of a moving cell
+        velocity = reactor.motion.mean
+        moving_rows = set(bed.moving_rows) if velocity > 0.0 else set()
+        self.is_moving = np.array([place in moving_rows for place in bed.place], dtype=bool).reshape(
+            len(bed.cells)
+        )
+        self.moving, self.resting = np.flatnonzero(self.is_moving), np.flatnonzero(~self.is_moving)
+        self.place = np.full(self.own, -1)  # of own cells in `bed.cells`; -1 where nothing reacts on solids
+        self.place[bed.cells] = np.arange(len(bed.cells))
+        self.place_moving = np.cumsum(self.is_moving) - 1  # of moving cells of `bed.cells` in `moving`
+        self.residence = strip.grid.dx / velocity if velocity > 0.0 else np.inf
+        self.periodic = bed.periodic
+        self.operators = transport.operators(number)
+        self.cells = CellMatrix(strip, self.b)
+        self.diagonal = self.cells.set_fluxes(self.operators[: self.b])
+        self._number_unknowns()
+        self.theta = bed.theta.copy()  # leaving coverage where moving, own coverage where at rest
+        self.concentration = transport.concentration[: self.b].copy()
+        self.old = (self.concentration.copy(), self.theta.copy())
+        self.shares = np.array([stays_open(inlet) for inlet in transport.case.geometry.inlets])
+        self._matrix = PETSc.Mat().create(strip.comm)
+        self._assembled = False
+
+    def _number_unknowns(self) -> None:
+        """Gas unknowns cell by cell, then the coverages of moving cells; both contiguous on each rank."""
+        comm, bed, strip = self.strip.comm, self.bed, self.strip
+        local = self.b * self.own + self.free * len(self.moving)
+        first = int(comm.scan(local)) - local
+        self.local, self.first = local, first
+        sizes = comm.allgather((first, strip.owned))
+        # global number of the first gas unknown of any cell, from its PETSc cell number
+        starts = np.cumsum([0] + [owned for _, owned in sizes])[:-1]
+        owner = np.searchsorted(starts, strip.global_cell, side="right") - 1
+        firsts = np.array([f for f, _ in sizes])
+        self.gas_number = firsts[owner] + self.b * (strip.global_cell - starts[owner])
+        mine = np.full(len(bed.cells), -1.0)
+        mine[self.moving] = first + self.b * self.own + self.free * np.arange(len(self.moving))
+        everyone = bed.scatter.to_all(mine).reshape(len(bed.rows), bed.columns).astype(np.int64)
+        self.theta_number = first + self.b * self.own + self.free * np.arange(len(self.moving))
+        rows, columns = bed.place[self.moving], strip.column[bed.cells[self.moving]]
+        before = everyone[rows, columns - 1]
+        self.upstream = np.where((columns > 0) | self.periodic, before, -1)
+        self.column = columns
+
+    def incoming(self) -> Floats:
+        """Coverage of the solids entering every own moving cell, (sites, moving)."""
+        whole = self.bed.scatter.to_all(self.theta).reshape(self.kinds, len(self.bed.rows), self.bed.columns)
+        rows = self.bed.place[self.moving]
+        entering = whole[:, rows, self.column - 1]
+        fresh = self.bed.fresh[:, rows]
+        return np.where(self.upstream >= 0, entering, fresh)
+
+    def entering(self, step: float) -> tuple[float, Floats]:
+        """Time [s] that solids spend in a moving cell, and their coverage as they come in, (sites, moving).
+
+        The storage of a pseudo-time step is one more stream of sites, of age `step`.
+        """
+        span = 1.0 / (1.0 / step + 1.0 / self.residence)
+        return span, span / self.residence * self.incoming() + span / step * self.old[1][:, self.moving]
+
+    def residual(self, step: float) -> tuple[Floats, Floats, dict]:
+        """Gas residual (b, own) [mol/m/s], coverage residual (free, moving), and what the Jacobian needs."""
+        transport, bed = self.transport, self.bed
+        c, cells = self.concentration, bed.cells
+        old_c, old_theta = self.old
+        coupled = self.operators[: self.b]
+        supply = transport.supply(coupled, self.shares, transport.outlet_means(coupled, c))
+        gas_rates, gas_slopes = transport.gas.rates(c)
+        source = transport.nu_gas[:, : self.b].T @ gas_rates * transport.gas_volume
+        span, entering = self.entering(step)
+        at_rest = transport.surface.part(self.resting).rates(
+            c[:, cells[self.resting]], old_theta[:, self.resting], step
+        )
+        conveyed = transport.surface.part(self.moving).conveyed(c[:, cells[self.moving]], entering, span)
+        rates = np.zeros((len(transport.surface.reactions), len(cells)))
+        rates[:, self.resting], rates[:, self.moving] = at_rest[0], conveyed.rates
+        source[:, cells] += (transport.nu_surface[:, : self.b].T @ rates) * transport.active_area
+        gas = transport.flux_product(coupled, c) - supply - source
+        gas += transport.gas_volume * (c - old_c) / step
+        coverage = (self.theta[:, self.moving] - conveyed.out)[: self.free]
+        parts = {
+            "rates": rates,
+            "gas_rates": gas_rates,
+            "gas_slopes": gas_slopes,
+            "rest_slopes": at_rest[1],
+            "conveyed": conveyed,
+            "share": span / self.residence,
+        }
+        return gas, coverage, parts
+
+    def jacobian(self, step: float, parts: dict) -> PETSc.Mat:
+        """The matrix of the linear system for all unknowns."""
+        transport, b, free = self.transport, self.b, self.free
+        cells, area = self.bed.cells, transport.active_area
+        nu = transport.nu_surface[:, :b]
+        blocks = np.zeros((self.own, b, b))
+        if len(transport.gas.reactions):
+            blocks -= (
+                np.einsum("ri,rjn->nij", transport.nu_gas[:, :b], parts["gas_slopes"])
+                * transport.gas_volume[:, None, None]
+            )
+        slopes = np.zeros((len(transport.surface.reactions), b, len(cells)))
+        slopes[:, :, self.resting], slopes[:, :, self.moving] = (
+            parts["rest_slopes"],
+            parts["conveyed"].rates_c,
+        )
+        blocks[cells] -= np.einsum("ri,rjn->nij", nu, slopes) * area[:, None, None]
+        for i in range(b):
+            blocks[:, i, i] += self.diagonal[i] + transport.gas_volume / step
+        conveyed, share = parts["conveyed"], parts["share"]
+        last = self.kinds - 1
+        by_theta = (
+            conveyed.rates_theta[:, :last] - conveyed.rates_theta[:, last:]
+        ) * share  # (reactions, free, moving)
+        gas_theta = -np.einsum("ri,rkn->nik", nu, by_theta) * area[self.moving][:, None, None]
+        theta_c = -np.moveaxis(conveyed.out_c[:free], -1, 0)  # (moving, free, b)
+        theta_theta = -np.moveaxis(
+            (conveyed.out_theta[:free, :last] - conveyed.out_theta[:free, last:]) * share, -1, 0
+        )
+        linked = self.upstream >= 0
+        values = [
+            self.cells.values[: self.cells.count],
+            blocks.ravel(),
+            gas_theta[linked].ravel(),
+            theta_c.ravel(),
+            theta_theta[linked].ravel(),
+            np.ones(free * len(self.moving)),
+        ]
+        if not self._assembled:
+            self._assembled = True
+            self._matrix.setSizes(((self.local, None), (self.local, None)))
+            self._matrix.setType("aij")
+            rows, columns = self._pattern(linked)
+            self._matrix.setPreallocationCOO(rows.astype(PETSc.IntType), columns.astype(PETSc.IntType))
+        self._matrix.setValuesCOO(np.concatenate(values))
+        return self._matrix
+
+    def _pattern(self, linked: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows and columns of the entries in the order of `jacobian`."""
+        b, free = self.b, self.free
+        faces = self.strip.faces
+        ahead_of, behind_of = self.cells.from_behind, self.cells.from_ahead
+        rows, columns = [], []
+        for mine, other in (
+            (faces.behind[ahead_of], faces.ahead[ahead_of]),
+            (faces.ahead[behind_of], faces.behind[behind_of]),
+        ):
+            for k in range(b):
+                rows.append(self.gas_number[mine] + k)
+                columns.append(self.gas_number[other] + k)
+
+        def block(row: NDArray[np.int64], n: int, column: NDArray[np.int64], m: int) -> None:
+            i, j = np.divmod(np.arange(n * m), m)
+            rows.append((row[:, None] + i).ravel())
+            columns.append((column[:, None] + j).ravel())
+
+        own = self.gas_number[: self.own]
+        cell = self.gas_number[self.bed.cells[self.moving]]
+        block(own, b, own, b)
+        block(cell[linked], b, self.upstream[linked], free)
+        block(self.theta_number, free, cell, b)
+        block(self.theta_number[linked], free, self.upstream[linked], free)
+        diagonal = (self.theta_number[:, None] + np.arange(free)).ravel()
+        rows.append(diagonal)
+        columns.append(diagonal)
+        return np.concatenate(rows), np.concatenate(columns)
+
+    def sweep(self, step: float) -> None:
+        """Carry the solids along the bed at the present concentrations: theta_out of every cell from the one before it.
+
+        In every cell theta_out = M theta_in with a stochastic M, so the coverage stays within [0, 1]. Periodic solids come in as they
+        left: the fixed point of the product of all M.
+        """
+        bed, surface, k = self.bed, self.transport.surface, self.kinds
+        chosen = self.bed.cells[self.moving]
+        span = 1.0 / (1.0 / step + 1.0 / self.residence)
+        share = span / self.residence
+        part = surface.part(self.moving)
+        c = self.concentration[:, chosen]
+        columns = [
+            part.conveyed(c, np.repeat(e[:, None], len(self.moving), axis=1), span).out for e in np.eye(k)
+        ]
+        local = np.zeros((k * k + k, len(bed.cells)))
+        local[: k * k, self.moving] = np.concatenate(columns)  # column by column
+        local[k * k :, self.moving] = self.old[1][:, self.moving]
+        whole = bed.scatter.to_all(local).reshape(-1, len(bed.rows), bed.columns)[:, bed.moving_rows]
+        m = np.moveaxis(
+            whole[: k * k].reshape(k, k, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0)
+        )  # (columns, rows, out, in)
+        aged = (1.0 - share) * np.moveaxis(whole[k * k :], (0, 1, 2), (2, 1, 0))  # (columns, rows, sites)
+        incoming = bed.fresh[:, bed.moving_rows].T
+        if self.periodic:
+            incoming = _fixed_point(m, aged, share, incoming)
+        theta = np.empty_like(aged)
+        for j in range(len(m)):
+            incoming = np.einsum("roi,ri->ro", m[j], share * incoming + aged[j])
+            incoming = np.maximum(incoming, 0.0)
+            incoming = theta[j] = incoming / incoming.sum(
+                axis=1, keepdims=True
+            )  # rounding would add up along the bed
+        result = np.zeros((k, len(bed.rows), bed.columns))
+        result[:, bed.moving_rows] = np.moveaxis(theta, (0, 1, 2), (2, 1, 0))
+        new = self.theta.copy()
+        new[:, self.moving] = bed.scatter.to_local(result.reshape(k, -1))[:, self.moving]
+        self.theta = new
+
+    def size(self, gas: Floats, coverage: Floats) -> float:
+        """Sum of |gas residual| plus that of the coverage in sites per second, over the largest feed."""
+        sites = (
+            np.abs(coverage) @ self.bed.capacity[self.moving] / self.residence
+            if len(self.moving)
+            else np.zeros(1)
+        )
+        parts = total(self.strip.comm, [np.abs(gas).sum(), sites.sum()])
+        return float(parts.sum() / max(self.transport.feed_rate, 1e-300))
+
+
+def _fixed_point(m: Floats, aged: Floats, share: float, start: Floats) -> Floats:
+    """Coverage (rows, sites) that the solids bring back after one turn: theta = A theta + c of all columns together."""
+    k = m.shape[-1]
+    a = np.broadcast_to(np.eye(k), m.shape[1:]).copy()
+    c = np.zeros(m.shape[1:3])
+    for j in range(len(m)):
+        a = share * m[j] @ a
+        c = np.einsum("roi,ri->ro", m[j], share * c + aged[j])
+    theta = start
+    for row in range(len(a)):
+        gap = np.eye(k) - a[row]
+        theta[row] = np.linalg.lstsq(np.vstack([gap, np.ones(k)]), np.append(c[row], 1.0))[0]
+    return theta
