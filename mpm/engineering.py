@@ -15,11 +15,11 @@ from mpm.layout import Inlet
 from mpm.materials import Material
 from mpm.schedule import Schedule
 
-MEMORY_OF_A_RANK = 0.15e9
+MEMORY_OF_A_RANK = 0.11e9
 """Interpreter, PETSc and MPI before there is a mesh [bytes]."""
 MEMORY_OF_A_CELL = 17.5e3
 """Flow factors, operators and fields [bytes]; measured, as the next one, at 28,000 and 99,000 cells."""
-MEMORY_OF_A_CELL_AND_PHASE = 0.45e3
+MEMORY_OF_A_CELL_AND_PHASE = 0.25e3
 """Operators of one phase of the cycle in the resolved fidelity [bytes]."""
 
 

@@ -238,7 +238,9 @@ class FlowProblem:
         """Subtract J^-1 residual from the state; J includes the derivative of the convection. Raises ConvergenceError."""
         if self._jacobian is None:
             self._jacobian = dolfinx.fem.form(self._jacobian_form)
-        matrix = dolfinx.fem.petsc.assemble_matrix(self._jacobian)
+        # the convection's derivative couples the same facets: copying the pattern spares building it, the peak of memory
+        matrix = self.steady_matrix.duplicate()
+        dolfinx.fem.petsc.assemble_matrix(matrix, self._jacobian)
         matrix.assemble()
         matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
         stokes = self._solver("steady")

@@ -14,9 +14,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-from rich.console import Console
-from rich.table import Table
-
 ROOT = Path(__file__).resolve().parent.parent
 THESIS_ROWS = {"plenum": 20, "frit": 12, "bed": 20, "headspace": 69}  # with 0.34 mm columns: 49,731 cells
 
@@ -117,6 +114,9 @@ def main() -> None:
     if options.worker:
         worker(options.worker, options.seconds)
         return
+    from rich.console import Console  # here, because what the workers import counts as their memory
+    from rich.table import Table
+
     table = Table(title="Single TMA zone at the thesis mesh, all species, 20 s")
     for column in (
         "fidelity",
