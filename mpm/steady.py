@@ -58,12 +58,15 @@ class SteadyProblem(SteadySystem):
         """Find the quasi-steady state. Raises ConvergenceError; the last iterate is kept."""
         self._start_from_coarser()
         start = self.concentration, self.theta
-        if not self._relax(LAST_STEP, TRIES):
-            self.concentration, self.theta = start
-            self._pseudo_time()
+        try:
+            if not self._relax(LAST_STEP, TRIES):
+                self.concentration, self.theta = start
+                self._pseudo_time()
+        finally:
+            self._release()
 
     def newton(self, step: float, share: float = 1.0) -> float:
-        """One Newton step at pseudo-time step `step` [s]; returns the residual after it, relative to the feed.
+        """One Newton step, or a `share` of it, at pseudo-time step `step` [s]; returns the residual after it, relative to the feed.
 
         The linear system gives the inflow of every cell and the coverage with which solids enter it. Concentrations follow from the
         balance of each cell with these, coverages from the concentrations by `sweep`; both stay physical, however long the step.
@@ -92,12 +95,16 @@ class SteadyProblem(SteadySystem):
     def _relax(self, step: float, tries: int, target: float = CONVERGED) -> bool:
         """Newton steps until the residual is below `target`; False when `tries` are not enough."""
         worst, share = np.inf, 1.0
+        start = self.concentration, self.theta
         for _ in range(tries):
             last = worst
             try:
                 worst = self.newton(step, share)
             except ConvergenceError as error:
                 self._trouble = error
+                return False
+            if not np.isfinite(worst):
+                self.concentration, self.theta = start
                 return False
             self.watch(self.iterations, worst)
             if worst < target or (worst < ROUNDING and worst > 0.5 * last):
@@ -142,14 +149,12 @@ class SteadyProblem(SteadySystem):
             self.sweep(LAST_STEP)
         except ConvergenceError:
             pass  # a first guess is not worth an error
-        finally:
-            problem.release()
 
-    def release(self) -> None:
-        """Free the factor; collective."""
+    def _release(self) -> None:
+        """Free the matrix and its factor; collective."""
         if self._solver is not None:
             self._solver.destroy()
-            self._solver = None
+            self._solver = self._matrix = None
 
     def _failure(self, step: float) -> ConvergenceError:
         """Says which cell is worst."""

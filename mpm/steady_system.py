@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.cellmatrix import CellMatrix
+from mpm.errors import InputError
 from mpm.fem import PETSc
 from mpm.parallel import total
 from mpm.transport import stays_open
@@ -33,12 +34,17 @@ class SteadySystem:
     """Residual and Jacobian on the flow field `number` of the reactor's transport, and the coverage that follows from concentrations.
 
     `concentration` (coupled, own cells) [mol/m3]; `theta` (sites, reactive cells): leaving coverage where moving, own coverage at rest.
+    Raises InputError when nothing reacts.
     """
 
     def __init__(self, reactor: Reactor, number: int):
         self.transport, self.bed, self.strip = reactor.transport, reactor.bed, reactor.strip
         transport, bed, strip = self.transport, self.bed, self.strip
         self.b, self.own = len(transport.roles.coupled), strip.owned
+        if self.b == 0:
+            raise InputError(
+                "fidelity: found steady, but no inlet feeds a species that reacts; accepted: averaged or resolved, or a feed"
+            )
         self.kinds = len(bed.theta)
         self.free = self.kinds - 1  # independent coverages of a moving cell
         velocity = reactor.motion.mean
@@ -60,8 +66,7 @@ class SteadySystem:
         self.concentration = transport.concentration[: self.b].copy()
         self.old = (self.concentration.copy(), self.theta.copy())
         self.shares = np.array([stays_open(inlet) for inlet in transport.case.geometry.inlets])
-        self._matrix = PETSc.Mat().create(strip.comm)
-        self._assembled = False
+        self._matrix: PETSc.Mat | None = None
 
     def _number_unknowns(self) -> None:
         """Gas unknowns cell by cell, then the coverages of moving cells; both contiguous on each rank."""
@@ -168,8 +173,8 @@ class SteadySystem:
             theta_theta[linked].ravel(),
             np.ones(free * len(self.moving)),
         ]
-        if not self._assembled:
-            self._assembled = True
+        if self._matrix is None:
+            self._matrix = PETSc.Mat().create(self.strip.comm)
             self._matrix.setSizes(((self.local, None), (self.local, None)))
             self._matrix.setType("aij")
             rows, columns = self._pattern(linked)
@@ -213,6 +218,8 @@ class SteadySystem:
         In every cell theta_out = M theta_in with a stochastic M, so the coverage stays within [0, 1]. Periodic solids come in as they
         left: the fixed point of the product of all M.
         """
+        if not np.isfinite(self.residence):
+            return
         bed, surface, k = self.bed, self.transport.surface, self.kinds
         chosen = self.bed.cells[self.moving]
         span = 1.0 / (1.0 / step + 1.0 / self.residence)

@@ -11,6 +11,7 @@ import mpm.coarsening
 import mpm.steady
 from mpm.case import Case
 from mpm.cli import main
+from mpm.errors import InputError
 from mpm.reactor import Reactor
 from mpm.replay import Replay
 
@@ -197,3 +198,17 @@ def test_failure_leaves_the_last_iterate(
     assert all(np.isfinite(v) for v in physical_numbers(summary).values())
     assert (tmp_path / "run" / "fields.pvd").exists()
     assert "Newton stopped" in (tmp_path / "run" / "run.log").read_text()
+
+
+def test_nothing_to_react_is_refused() -> None:
+    """Fails when a steady case without any precursor ends otherwise than with a message that says so."""
+    with pytest.raises(InputError, match="no inlet feeds a species that reacts"):
+        Reactor(zone({**STEADY, TMA: 0.0}, TINY), MPI.COMM_SELF).run()
+
+
+def test_solids_that_stand_still() -> None:
+    """Fails when a bed that does not move is not saturated by a single precursor, all of which then leaves."""
+    _, result = run(zone({**STEADY, "motion.bed_velocity": "0 m/s"}, TINY))
+    assert result.coverage("bed", "OH").max() < 1e-9
+    tma = result.summary["species"]["TMA"]
+    assert tma["left"] == pytest.approx(tma["fed"], rel=1e-9)
