@@ -296,7 +296,11 @@ def _respond(rate: Floats, slopes: Floats, concentration: Floats, g: int, j: int
 
 def phi1(x: Floats) -> Floats:
     """(1 - exp(-x)) / x for x >= 0."""
-    return _series(x, lambda v: -np.expm1(-v) / v, (1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0))
+    return _series(
+        x,
+        lambda v: -np.expm1(-v) / v,
+        (1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0, -1.0 / 720.0, 1.0 / 5040.0),
+    )
 
 
 def phi2(x: Floats) -> Floats:
@@ -304,7 +308,7 @@ def phi2(x: Floats) -> Floats:
     return _series(
         x,
         lambda v: (1.0 + np.expm1(-v) / v) / v,
-        (1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0, 1.0 / 720.0),
+        (1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0, 1.0 / 720.0, -1.0 / 5040.0, 1.0 / 40320.0),
     )
 
 
@@ -313,7 +317,7 @@ def dphi1(x: Floats) -> Floats:
     return _series(
         x,
         lambda v: (np.exp(-v) + np.expm1(-v) / v) / v,
-        (-1.0 / 2.0, 1.0 / 3.0, -1.0 / 8.0, 1.0 / 30.0, -1.0 / 144.0),
+        (-1.0 / 2.0, 1.0 / 3.0, -1.0 / 8.0, 1.0 / 30.0, -1.0 / 144.0, 1.0 / 840.0, -1.0 / 5760.0),
     )
 
 
@@ -322,12 +326,12 @@ def dphi2(x: Floats) -> Floats:
     return _series(
         x,
         lambda v: -((np.exp(-v) + np.expm1(-v) / v) / v + (1.0 + np.expm1(-v) / v) / v) / v,
-        (-1.0 / 6.0, 1.0 / 12.0, -1.0 / 40.0, 1.0 / 180.0, -1.0 / 1008.0),
+        (-1.0 / 6.0, 1.0 / 12.0, -1.0 / 40.0, 1.0 / 180.0, -1.0 / 1008.0, 1.0 / 6720.0, -1.0 / 51840.0),
     )
 
 
 def _series(x: Floats, closed: Callable[[Floats], Floats], coefficients: tuple[float, ...]) -> Floats:
-    """`closed` away from 0, its Taylor polynomial where cancellation would spoil it."""
+    """`closed` away from 0, its Taylor polynomial where cancellation would spoil it; what that leaves out is below rounding."""
     small = x < 0.02
     polynomial = np.polynomial.polynomial.polyval(x, coefficients)
     return np.where(small, polynomial, closed(np.where(small, 1.0, x)))

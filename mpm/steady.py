@@ -30,6 +30,7 @@ CONVERGED = 1e-11  # sum of |residual| over the largest feed
 ROUNDING = 1e-10  # accepted when nothing improves any more
 TRIES = 50  # Newton steps from the first guess
 STEP_TRIES = 15  # and per step of pseudo-time
+LIMIT = 400  # Newton steps on one mesh
 DAMPED = 0.5  # share of a Newton step that is taken when the one before made things worse: two iterates may follow each other for ever
 SETTLED = 0.01  # residual at which pseudo-time goes on
 FIRST_STEP, SHORTEST_STEP = 1.0, 1e-6  # s, pseudo-time
@@ -129,7 +130,7 @@ class SteadyProblem(SteadySystem):
                 step = min((10.0 if step < FAR else FAR) * step, LAST_STEP)
             else:
                 step /= 20.0
-                if step < SHORTEST_STEP:
+                if step < SHORTEST_STEP or self.iterations > LIMIT:
                     raise self._failure(step) from self._trouble
                 self.concentration, self.theta = self.old
 

@@ -12,6 +12,7 @@ import mpm.steady
 from mpm.case import Case
 from mpm.cli import main
 from mpm.errors import InputError
+from mpm.kinetics import phi1, phi2
 from mpm.reactor import Reactor
 from mpm.replay import Replay
 
@@ -212,3 +213,10 @@ def test_solids_that_stand_still() -> None:
     assert result.coverage("bed", "OH").max() < 1e-9
     tma = result.summary["species"]["TMA"]
     assert tma["left"] == pytest.approx(tma["fed"], rel=1e-9)
+
+
+def test_sites_are_counted_to_rounding() -> None:
+    """Fails when sites that cross a cell at a small turnover are lost or made by more than rounding: it adds up over all cells."""
+    x = np.geomspace(1e-8, 10.0, 2001)
+    np.testing.assert_allclose(np.exp(-x) + x * phi1(x), 1.0, rtol=0.0, atol=5e-16)
+    np.testing.assert_allclose(phi1(x) + x * phi2(x), 1.0, rtol=0.0, atol=5e-16)
