@@ -33,6 +33,7 @@ PASSES, FLUSH = (
 )  # residence times of the bed in the zone, and seconds to renew the headspace, until the comparison
 LAYERS = ("plenum", "frit", "bed", "headspace")
 SITE = "OAl(CH3)2"
+FRONT = "front.tma.bed.coverage"  # m upstream of the inlet, where the mean coverage of the bed is 1/2
 MESH = {
     "geometry.cell_width": "2.33 mm",
     "geometry.layer.plenum.cells": 4,
@@ -94,6 +95,9 @@ def measure(model: str, gamma: float, speed: float) -> dict[str, float]:
         "x_CH4": float(np.mean(result.history["outlets.zone1.x.CH4"][-len(seen) :])),
         "processor_seconds": time.process_time() - begun,
     }
+    fronts = result.history.get(FRONT, np.array([]))[-len(seen) :]
+    if np.isfinite(fronts).any():
+        numbers["front"] = float(np.nanmean(fronts))
     KEPT.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(numbers), encoding="utf-8")
     return numbers
@@ -122,15 +126,18 @@ def dispersion(gamma: float) -> dict[str, list[float]]:
 
 def tables() -> str:
     """Markdown of everything measured so far."""
-    lines = ["| Gamma | bed, cm/s | model | box mean | exit mean | outlet CH4, 1e-6 | processor time, s |"]
-    lines.append("|" + " --- |" * 7)
+    lines = [
+        "| Gamma | bed, cm/s | model | box mean | exit mean | front, mm | outlet CH4, 1e-6 | processor time, s |"
+    ]
+    lines.append("|" + " --- |" * 8)
     for gamma in GAMMAS:
         for speed in SPEEDS:
             for model in MODELS:
                 path = KEPT / f"{model.replace(' ', '_')}-{gamma:g}-{speed:g}.json"
                 if path.exists():
                     n = json.loads(path.read_text(encoding="utf-8"))
-                    values = f"{n['box_mean']:.4f} | {n['exit_mean']:.4f} | {1e6 * n['x_CH4']:.2f} | {n['processor_seconds']:.1f}"
+                    front = f"{1e3 * n['front']:.2f}" if "front" in n else ""
+                    values = f"{n['box_mean']:.4f} | {n['exit_mean']:.4f} | {front} | {1e6 * n['x_CH4']:.2f} | {n['processor_seconds']:.1f}"
                     lines.append(f"| {gamma:g} | {speed:g} | {model} | {values} |")
     lines += [
         "",
