@@ -9,6 +9,7 @@ replaced by those at which every cell balances with that inflow: uptake up to wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,13 +39,36 @@ def balance_cells(system: SteadySystem, predicted: Floats, step: float) -> None:
     inflow = system.diagonal * predicted - transport.flux_product(coupled, predicted)
     inflow += transport.supply(coupled, system.shares, drawn) + storage * system.old[0]
     np.maximum(inflow, 0.0, out=inflow)
-    diagonal = system.diagonal + storage
     span, entering = system.entering(step)
-    c = np.maximum(np.where(predicted > 0.0, predicted, system.concentration), LOWEST)
+    start = np.maximum(np.where(predicted > 0.0, predicted, system.concentration), LOWEST)
     idle = NEGLIGIBLE * transport.feed_rate / max(transport.strip.grid.cells, 1)
-    active = np.arange(system.own)
-    for _ in range(TRIES):
-        source, slope = _sources(system, c, active, entering, span, step)
+    system.concentration = settle(
+        start,
+        system.diagonal + storage,
+        inflow,
+        lambda c, active: _sources(system, c, active, entering, span, step),
+        idle,
+    )
+
+
+def settle(
+    concentration: Floats,
+    diagonal: Floats,
+    inflow: Floats,
+    sources: Callable[[Floats, Ints], tuple[Floats, Floats]],
+    idle: float,
+    tries: int = TRIES,
+) -> Floats:
+    """Concentrations (coupled, n) [mol/m3] at which every cell balances: diagonal C - source(C) = inflow.
+
+    Newton's method in all cells at once from positive `concentration`, on fewer and fewer of them; `diagonal` [m2/s] and `inflow`
+    [mol/m/s] are (coupled, n). `sources(c, active)` gives what reactions make in the cells `active` at concentrations `c` (coupled,
+    active) [mol/m/s] and its derivatives (active, coupled, coupled) [m2/s]. Residuals below `idle` [mol/m/s] need no work.
+    """
+    b = len(concentration)
+    c, active = concentration.copy(), np.arange(concentration.shape[1])
+    for _ in range(tries):
+        source, slope = sources(c[:, active], active)
         held = diagonal[:, active] * c[:, active]
         residual = held - inflow[:, active] - source
         loose = (np.abs(residual) > TIGHT * (held + inflow[:, active]) + idle).any(axis=0)
@@ -52,19 +76,18 @@ def balance_cells(system: SteadySystem, predicted: Floats, step: float) -> None:
         if not len(active):
             break
         matrix = -slope[loose]
-        for i in range(system.b):
+        for i in range(b):
             matrix[:, i, i] += diagonal[i, active]
         change = np.linalg.solve(matrix, residual[:, loose].T[:, :, None])[:, :, 0].T
         c[:, active] = np.maximum(np.maximum(c[:, active] - change, SHRINK * c[:, active]), LOWEST)
-    system.concentration = c
+    return c
 
 
 def _sources(
     system: SteadySystem, concentration: Floats, active: Ints, entering: Floats, span: float, step: float
 ) -> tuple[Floats, Floats]:
     """What reactions make in the `active` cells (coupled, n) [mol/m/s], and its derivatives (n, coupled, coupled) [m2/s]."""
-    transport, b = system.transport, system.b
-    c = concentration[:, active]
+    transport, b, c = system.transport, system.b, concentration
     source, slope = np.zeros_like(c), np.zeros((len(active), b, b))
     if len(transport.gas.reactions):
         nu = transport.nu_gas[:, :b]

@@ -68,7 +68,7 @@ class DirectSolver:
 class KrylovSolver:
     """BiCGStab with incomplete LU on each rank; the right choice for advection-diffusion-reaction with small steps.
 
-    `fill` levels of fill-in pay for themselves where one factor serves many solves; the matrix must be assembled by then.
+    `fill` levels of fill-in pay for themselves in long steps, or where one factor serves many solves.
     """
 
     def __init__(self, matrix: PETSc.Mat, name: str, tolerance: float, iterations: int = 200, fill: int = 0):
@@ -83,10 +83,7 @@ class KrylovSolver:
             pc.setFactorLevels(fill)
         else:
             pc.setType("bjacobi")  # its default block solver is ILU(0)
-            if fill:
-                self.ksp.setUp()
-                for block in pc.getBJacobiSubKSP():
-                    block.getPC().setFactorLevels(fill)
+        self._fill = fill  # of blocks, which exist once there is a matrix to solve with
 
     def solve(
         self,
@@ -102,7 +99,14 @@ class KrylovSolver:
         """
         if tolerance is not None:
             self.ksp.rtol = tolerance
-        self.ksp.getPC().setReusePreconditioner(not refactor)
+        pc = self.ksp.getPC()
+        if self._fill and pc.getType() == "bjacobi":
+            self.ksp.setUp()
+            for block in pc.getBJacobiSubKSP():
+                block.getPC().setType("ilu")
+                block.getPC().setFactorLevels(self._fill)
+            self._fill = 0
+        pc.setReusePreconditioner(not refactor)
         self.ksp.setInitialGuessNonzero(guess)
         self.ksp.solve(rhs, solution)
         check(self.ksp, self.name)
