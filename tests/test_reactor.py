@@ -286,8 +286,8 @@ def test_a_failed_step_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
         return solve(self, *arguments)
 
     monkeypatch.setattr(Transport, "_solve_linear", sometimes)
-    _, halved = run(zone(SHORT, TINY))
-    assert calls["n"] > 110
+    reactor, halved = run(zone(SHORT, TINY))
+    assert calls["n"] > 1.3 * reactor.steps
     monkeypatch.undo()
     _, whole = run(zone(SHORT, TINY))
     for key in ("fed", "reacted"):
@@ -307,7 +307,7 @@ def test_newton_failure_keeps_the_last_good_state(monkeypatch: pytest.MonkeyPatc
         if r.time > 0.55:
             monkeypatch.setattr(mpm.transport, "NEWTON_LIMIT", 1)
 
-    with pytest.raises(ConvergenceError, match=r"step 6\d.*t = 0\.\d+ s.*TMA.*Newton.*residual"):
+    with pytest.raises(ConvergenceError, match=r"step 4\d.*t = 0\.\d+ s.*TMA.*Newton.*residual"):
         reactor.run(output=tmp_path / "failed", callback=spoil)
     assert_laws(reactor)
     assert 0.55 < reactor.time < 0.75
