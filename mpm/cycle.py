@@ -99,9 +99,8 @@ def periodic_flow(
         float(np.mean([m.frame_velocity_y for m in motions])),
         0.0,
     )
-    fields: list[
-        FlowField
-    ] = []  # of the last cycle; the next one takes their places, because two would be much to hold
+    # of the last cycle; the next one takes their places, because two would be much to hold
+    fields: list[FlowField] = []
     for cycle in range(CYCLE_LIMIT):
         convective_mean = problem.convective_force().duplicate()
         state_mean = np.zeros_like(problem.state.x.array)

@@ -33,11 +33,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 NEWTON_LIMIT = 30
-FILL = {
-    "resolved": 0,
-    "averaged": 1,
-    "steady": 1,
-}  # of the incomplete factor: steps of a millisecond need none
+# levels of fill-in of the incomplete factor: steps of a millisecond need none
+FILL = {"resolved": 0, "averaged": 1, "steady": 1}
 REFACTORED = 2  # Newton iterations of a step with an incomplete factor of their own; afterwards the matrix hardly changes
 RESIDUAL = 1e-10  # sum of |residual| over all cells, relative to the largest feed
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below

@@ -45,6 +45,7 @@ SAWTOOTH = {"kind": "sawtooth", "gamma": 10.273 / 9.81, "frequency": "48 Hz", "a
 AIR = {"velocity": "0 cm/s"}
 
 MARKS = ("<!-- table of scripts/dem_table.py -->", "<!-- end of the table -->")
+TOLERANCE = 0.15  # of the seed's value
 Row = tuple[str, str, dict[str, Any]]  # what it is, the seed's value in cm/s, the powder file
 
 
@@ -134,11 +135,27 @@ def measure(name: str, stiffness: float, seed: int, cycles: int, out: Path) -> N
     print(f"{result.stem}: {100 * kept.mean():.3f} cm/s", flush=True)
 
 
+def verdict(expected: str, speeds: list[float]) -> str:
+    """Where the seed's value `expected` [cm/s], one number or a range, lies from the mean of `speeds` [cm/s] of all seeds.
+
+    "reproduced" within TOLERANCE of it, "within the spread" within two standard deviations between seeds, else the ratio.
+    """
+    mean = statistics.mean(speeds)
+    low, high = (float(part) for part in (expected.split("-") * 2)[:2])
+    off = max(low - mean, mean - high, 0.0)
+    nearest = min(max(mean, low), high)
+    if off <= TOLERANCE * nearest:
+        return "reproduced"
+    if len(speeds) > 2 and off <= 2.0 * statistics.stdev(speeds):
+        return "within the spread"
+    return f"{mean / nearest:.2f} of it"
+
+
 def markdown(out: Path) -> str:
     """The table of docs/dem.md from the results found."""
     lines = [
-        "| case | seed [cm/s] | k [N/m] | seeds | mean ± spread [cm/s] | contacts | CPU s per cycle |",
-        "|---|---|---|---|---|---|---|",
+        "| case | seed [cm/s] | k [N/m] | seeds | mean ± spread [cm/s] | contacts | CPU s per cycle | verdict |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for name, (what, expected, _) in ROWS.items():
         found = [json.loads(p.read_text()) for p in sorted(out.glob(f"{name}_k*_s*.json"))]
@@ -150,7 +167,7 @@ def markdown(out: Path) -> str:
             cost = statistics.median(r["cpu_seconds_per_cycle"] for r in runs)
             lines.append(
                 f"| {what} | {expected} | {stiffness:g} | {len(runs)} | {statistics.mean(speeds):.2f}{spread} "
-                f"| {contacts:.1f} | {cost:.0f} |"
+                f"| {contacts:.1f} | {cost:.0f} | {verdict(expected, speeds)} |"
             )
     return "\n".join(lines)
 

@@ -27,10 +27,8 @@ KEPT = ROOT / "results" / "open_question"
 DOCUMENT = ROOT / "docs" / "open_question.md"
 BEGIN, END = "<!-- tables: written by scripts/open_question.py -->", "<!-- end of tables -->"
 GAMMAS, SPEEDS = (0.3, 0.4, 0.5, 0.6), (0.5, 1.3, 3.0)
-PASSES, FLUSH = (
-    2.0,
-    15.0,
-)  # residence times of the bed in the zone, and seconds to renew the headspace, until the comparison
+# residence times of the bed in the zone, and seconds to renew the headspace, until the comparison
+PASSES, FLUSH = 2.0, 15.0
 LAYERS = ("plenum", "frit", "bed", "headspace")
 SITE = "OAl(CH3)2"
 FRONT = "front.tma.bed.coverage"  # m upstream of the inlet, where the mean coverage of the bed is 1/2
@@ -70,6 +68,7 @@ def measure(model: str, gamma: float, speed: float) -> dict[str, float]:
             "motion.gamma": gamma,
             "motion.bed_velocity": f"{speed} cm/s",
             "time.end": f"{end} s",
+            "time.step": "10 ms",
             "output.every": "62.5 ms",
         },
     )
