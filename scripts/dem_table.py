@@ -138,16 +138,18 @@ def measure(name: str, stiffness: float, seed: int, cycles: int, out: Path) -> N
 def verdict(expected: str, speeds: list[float]) -> str:
     """Where the seed's value `expected` [cm/s], one number or a range, lies from the mean of `speeds` [cm/s] of all seeds.
 
-    "reproduced" within TOLERANCE of it, "within the spread" within two standard deviations between seeds, else the ratio.
+    "reproduced" in the range or within TOLERANCE of the number; "within the spread" within two standard deviations between seeds, if
+    these are below half of the value (else it cannot be told); otherwise the ratio to the nearest of the seed's values.
     """
     mean = statistics.mean(speeds)
     low, high = (float(part) for part in (expected.split("-") * 2)[:2])
-    off = max(low - mean, mean - high, 0.0)
     nearest = min(max(mean, low), high)
-    if off <= TOLERANCE * nearest:
+    off = abs(mean - nearest)
+    if off <= (TOLERANCE * nearest if low == high else 0.0):
         return "reproduced"
-    if len(speeds) > 2 and off <= 2.0 * statistics.stdev(speeds):
-        return "within the spread"
+    spread = 2.0 * statistics.stdev(speeds) if len(speeds) > 2 else 0.0
+    if off <= spread:
+        return "within the spread" if spread <= 0.5 * nearest else "spread too large to tell"
     return f"{mean / nearest:.2f} of it"
 
 
