@@ -75,11 +75,11 @@ class CellMatrix:
 
 
 class StepMatrix:
-    """gas_volume/dt + fluxes for one species, with the solvers that go with it."""
+    """gas_volume/dt + fluxes for one species, with the solvers that go with it; `fill` as in KrylovSolver."""
 
-    def __init__(self, strip: Strip, gas_volume: Floats, name: str):
+    def __init__(self, strip: Strip, gas_volume: Floats, name: str, fill: int = 0):
         self.cells = CellMatrix(strip, 1)
-        self.gas_volume, self.name = gas_volume, name
+        self.gas_volume, self.name, self.fill = gas_volume, name, fill
         self.key: tuple[int, float] | None = None
         self.krylov: KrylovSolver | None = None
         self.x, self.y = self.cells.matrix.createVecs()
@@ -96,7 +96,7 @@ class StepMatrix:
     def solve(self, rhs: Floats, guess: Floats, residual: float) -> Floats:
         """BiCGStab from `guess` until the residual norm is below `residual` [mol/m/s]."""
         if self.krylov is None:
-            self.krylov = KrylovSolver(self.cells.matrix, self.name, 0.0, fill=2)
+            self.krylov = KrylovSolver(self.cells.matrix, self.name, 0.0, fill=self.fill)
             self.krylov.ksp.setTolerances(
                 rtol=1e-13, atol=residual / np.sqrt(max(self.cells.matrix.size[0], 1))
             )

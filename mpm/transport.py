@@ -33,8 +33,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 NEWTON_LIMIT = 30
-# levels of fill-in of the incomplete factor: steps of a millisecond need none
-FILL = {"resolved": 0, "averaged": 1, "steady": 1}
+# levels of fill-in of the incomplete factors, for reacting species and for products: steps of a millisecond need none, and with
+# `resolved` every step has a matrix of its own
+FILL = {"resolved": (0, 0), "averaged": (1, 2), "steady": (1, 2)}
 REFACTORED = 2  # Newton iterations of a step with an incomplete factor of their own; afterwards the matrix hardly changes
 RESIDUAL = 1e-10  # sum of |residual| over all cells, relative to the largest feed
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
@@ -120,12 +121,13 @@ class Transport:
         self._assemblers = [FluxAssembler(case, strip, d) for d in self.diffusivities]
         self._flows: list[list[FluxOperator]] = []
         self._linear = [
-            StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s") for d in self.diffusivities
+            StepMatrix(strip, self.gas_volume, f"species with D = {d:g} m2/s", FILL[case.fidelity][1])
+            for d in self.diffusivities
         ]
         if self.roles.coupled:
             self._jacobian = CellMatrix(strip, len(self.roles.coupled))
             self._newton = KrylovSolver(
-                self._jacobian.matrix, "reacting species", FORCING, fill=FILL[case.fidelity]
+                self._jacobian.matrix, "reacting species", FORCING, fill=FILL[case.fidelity][0]
             )
             self._step, self._rhs = self._jacobian.matrix.createVecs()
         self._jacobian_key: int | None = None
