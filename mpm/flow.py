@@ -245,7 +245,8 @@ class FlowProblem:
         matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
         stokes = self._solver("steady")
         ksp = PETSc.KSP().create(matrix.comm)
-        ksp.setType("fgmres")
+        ksp.setType("gmres")  # keeps half the vectors of fgmres, which only a preconditioner that changes would need
+        ksp.setPCSide(PETSc.PC.Side.RIGHT)
         ksp.setTolerances(rtol=1e-4, atol=0.0, max_it=200)
         ksp.setOperators(matrix, stokes.matrix)
         ksp.setPC(stokes.ksp.getPC())
