@@ -99,8 +99,8 @@ def periodic_flow(
         float(np.mean([m.frame_velocity_y for m in motions])),
         0.0,
     )
-    # of the last cycle; the next one takes their places, because two would be much to hold
-    fields: list[FlowField] = []
+    # of the last cycle, as vectors; the next one takes their places, because two or their fields would be much to hold beside the factors
+    states: list[Floats] = []
     for cycle in range(CYCLE_LIMIT):
         convective_mean = problem.convective_force().duplicate()
         state_mean = np.zeros_like(problem.state.x.array)
@@ -110,18 +110,19 @@ def periodic_flow(
             convective_mean.axpy(1.0 / phases, force)
             problem.step(motion, force)
             state_mean += problem.state.x.array / phases
-            field = FlowField.of(problem)
-            speed = max(speed, np.abs(field.velocities).max(initial=0.0))
+            state = problem.state.x.array.copy()
             if cycle == 0:
-                fields.append(field)
+                states.append(state)
                 continue
-            change = max(change, np.abs(field.velocities - fields[phase].velocities).max(initial=0.0))
-            fields[phase] = field
+            velocities = problem.velocities()
+            speed = max(speed, np.abs(velocities).max(initial=0.0))
+            change = max(change, np.abs(velocities - problem.velocities(states[phase])).max(initial=0.0))
+            states[phase] = state
         change = _relative(problem, change, speed) if cycle else np.inf
         if watch is not None:
             watch(cycle, change)
         if change < PERIODIC:
-            return fields
+            return [_field(problem, state) for state in states]
         last = problem.state.x.array.copy()
         problem.state.x.array[:] = state_mean
         residual, _ = problem.steady_residual(mean, convective_mean)
@@ -131,6 +132,12 @@ def periodic_flow(
     raise ConvergenceError(
         f"periodic flow: velocities still change by {change:.3g} per cycle after {CYCLE_LIMIT} cycles"
     )
+
+
+def _field(problem: FlowProblem, state: Floats) -> FlowField:
+    """The fields of a stored state; leaves it in `problem.state`."""
+    problem.state.x.array[:] = state
+    return FlowField.of(problem)
 
 
 def _relative(problem: FlowProblem, change: float, speed: float) -> float:

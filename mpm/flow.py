@@ -245,7 +245,8 @@ class FlowProblem:
         matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
         stokes = self._solver("steady")
         ksp = PETSc.KSP().create(matrix.comm)
-        ksp.setType("gmres")  # keeps half the vectors of fgmres, which only a preconditioner that changes would need
+        # on the right, which fgmres is too; but gmres keeps half the vectors, and this preconditioner does not change
+        ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
         ksp.setTolerances(rtol=1e-4, atol=0.0, max_it=200)
         ksp.setOperators(matrix, stokes.matrix)
@@ -280,10 +281,14 @@ class FlowProblem:
 
     # --- looking at the state ---
 
-    def velocities(self) -> Floats:
-        """Velocities along the axes at the bottom, left, right and top facet of every local cell, (4, cells) [m/s]."""
+    def velocities(self, state: Floats | None = None) -> Floats:
+        """Velocities along the axes at the bottom, left, right and top facet of every local cell, (4, cells) [m/s].
+
+        Of the present state, or of a copy of its array made earlier.
+        """
         dofs = self._facet_dofs
-        return np.ascontiguousarray((self.state.x.array[dofs] / self._weights[dofs]).T)
+        values = self.state.x.array if state is None else state
+        return np.ascontiguousarray((values[dofs] / self._weights[dofs]).T)
 
     def pressure(self) -> Floats:
         """Pressure in every local cell [Pa]."""
