@@ -37,10 +37,10 @@ NEWTON_LIMIT = 30
 # `resolved` every step has a matrix of its own
 FILL = {"resolved": (0, 0), "averaged": (1, 2), "steady": (1, 2)}
 REFACTORED = 2  # Newton iterations of a step with an incomplete factor of their own; afterwards the matrix hardly changes
-RESIDUAL = 1e-10  # sum of |residual| over all cells, relative to the largest feed
+RESIDUAL = 1e-12  # sum of |residual| over all cells, relative to the largest feed
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
 FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
-LAST = 0.1 * RESIDUAL  # what the inner tolerance aims at, and no further
+LAST = 1e-2 * RESIDUAL  # what the inner tolerance aims at, and no further
 HALVINGS = 6
 BALANCED = 1e-4  # residual below which Newton's steps have no need of balanced cells
 
