@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from document import write_between
 
 from mpm.dem.case import load_case
 from mpm.dem.simulate import Simulation
@@ -192,10 +193,7 @@ def main() -> None:
         print(markdown(options.output))
         return
     if options.write:
-        before, _, rest = options.write.read_text().partition(MARKS[0])
-        after = rest.partition(MARKS[1])[2]
-        table = f"{MARKS[0]}\n{markdown(options.output)}\n{MARKS[1]}"
-        write_atomically(options.write, before + table + after)
+        write_between(options.write, *MARKS, markdown(options.output))
         return
     options.output.mkdir(parents=True, exist_ok=True)
     for stiffness in options.stiffness:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from document import write_between
 
 from mpm import Reactor, load_case
 from mpm.dispersion import vibrational_dispersion
@@ -166,11 +167,7 @@ def main() -> None:
         for speed in chosen.speed:
             for model in chosen.model:
                 print(f"Gamma {gamma:g}, {speed:g} cm/s, {model}: {measure(model, gamma, speed)}", flush=True)
-    if DOCUMENT.exists():
-        text = DOCUMENT.read_text(encoding="utf-8")
-        before, _, rest = text.partition(BEGIN)
-        _, _, after = rest.partition(END)
-        DOCUMENT.write_text(f"{before}{BEGIN}\n\n{tables()}\n\n{END}{after}", encoding="utf-8")
+    write_between(DOCUMENT, BEGIN, END, tables())
 
 
 if __name__ == "__main__":

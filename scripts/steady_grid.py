@@ -16,6 +16,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from document import write_between
+
 from mpm import Case, Reactor, load_case
 from mpm.errors import ConvergenceError
 from mpm.parallel import is_root
@@ -164,11 +166,8 @@ def main() -> None:
                 if root:
                     path.write_text(json.dumps(numbers), encoding="utf-8")
                     print(f"{path.stem}: {numbers}", flush=True)
-    if root and DOCUMENT.exists():
-        text = DOCUMENT.read_text(encoding="utf-8")
-        before, _, rest = text.partition(BEGIN)
-        _, _, after = rest.partition(END)
-        DOCUMENT.write_text(f"{before}{BEGIN}\n\n{table()}\n\n{END}{after}", encoding="utf-8")
+    if root:
+        write_between(DOCUMENT, BEGIN, END, table())
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ TINY = {
     "geometry.layer.bed.cells": 3,
     "geometry.layer.headspace.cells": 4,
 }
-SHORT = {"time.end": "1 s", "output.every": "0.25 s"}
+SHORT = {"time.end": "1 s", "time.step": "14 ms", "output.every": "0.25 s"}
 
 
 def zone(changes: Mapping[str, Any] | None = None, mesh: Mapping[str, Any] = COARSE) -> Case:
