@@ -38,6 +38,9 @@ NEWTON_LIMIT = 30
 FILL = {"resolved": (0, 0), "averaged": (1, 2), "steady": (1, 2)}
 REFACTORED = 2  # Newton iterations of a step with an incomplete factor of their own; afterwards the matrix hardly changes
 RESIDUAL = 1e-12  # sum of |residual| over all cells, relative to the largest feed
+ROUNDING = np.finfo(
+    float
+).eps  # of the sum of what the diagonal carries: a residual below that is rounding, and accepted
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
 FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
 LAST = 1e-2 * RESIDUAL  # what the inner tolerance aims at, and no further
@@ -298,9 +301,10 @@ class Transport:
             )
             source[:, cells] += (self.nu_surface[:, :b].T @ rates) * self.active_area
             residual = np.stack([m.multiply(c) for m, c in zip(matrices, new, strict=True)]) - rhs - source
-            worst = total(self.strip.comm, [np.abs(residual).sum()])[0] / scale
+            size, carried = total(self.strip.comm, [np.abs(residual).sum(), np.abs(diagonal * new).sum()])
+            worst = size / scale
             low = -largest(self.strip.comm, [-new.min(initial=0.0)])[0]
-            if worst < RESIDUAL and low >= -UNDERSHOOT * self.largest_feed:
+            if worst < max(RESIDUAL, ROUNDING * carried / scale) and low >= -UNDERSHOOT * self.largest_feed:
                 return new, rates, gas_rates
             if not np.isfinite(worst):
                 break

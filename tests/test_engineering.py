@@ -10,6 +10,7 @@ from mpm import engineering as eng
 from mpm.case import Case, load_case
 from mpm.check import check_case
 from mpm.cli import main
+from mpm.geometry import Grid
 
 EXAMPLE = Path(__file__).parent / "example_case.toml"
 
@@ -111,12 +112,36 @@ def test_expected_steps(case: Case) -> None:
         ({"geometry.inlet.tma.velocity": "10 cm/s"}, "minimum fluidisation"),
         ({"geometry.inlet.tma.mass_fractions.TMA": 0.021}, "not dilute"),
         ({"time.steps_per_cycle": 4}, "CFL above 1"),
-        ({"time.step": "0.1 s"}, "columns in a step"),
+        (
+            {"time.step": "0.1 s"},
+            "columns in a step, which leaves stripes of single columns in the coverage: lower time.step to 26.2 ms",
+        ),
+        ({"fidelity": "resolved", "geometry.cell_width": "2 mm"}, "per cent to diffusion"),
     ],
 )
 def test_what_is_questionable_is_said(case: Case, change: dict[str, object], text: str) -> None:
     (warning,) = check_case(case.with_(change))["warnings"]
     assert text in warning
+
+
+def test_steps_that_are_questionable_follow_the_advice(case: Case) -> None:
+    """Fails when the step that the warning names still slides more than a column, or needs two steps for one."""
+    assert eng.expected_steps(case.with_({"time.step": "26.2 ms"})) == 2 + math.ceil(
+        19.95 / (0.1397 / 411 / 0.013)
+    )
+    assert check_case(case.with_({"time.step": "26.2 ms"}))["warnings"] == []
+
+
+def test_numerical_diffusion(case: Case) -> None:
+    """(Pe/2) coth(Pe/2) - 1 at the bed's and the reactor's speed: small in the zone's columns, Pe^2/12, and steeper in wider ones."""
+    fine = case.with_({"fidelity": "resolved"})
+    speed = 0.013 + 0.168e-3 * 2.0 * math.pi * 16.0
+    pe = speed * case.geometry.moving_layer.material.tortuosity_factor[0] * 0.34e-3 / 2.88e-5
+    grid = Grid.from_case(fine)
+    assert eng.numerical_diffusion(fine, grid) == pytest.approx(pe**2 / 12.0, rel=0.01)
+    assert eng.numerical_diffusion(case, grid) < 0.25 * eng.numerical_diffusion(fine, grid)
+    still = case.with_({"motion.gamma": 0.0, "motion.bed_velocity": "0 m/s"})
+    assert eng.numerical_diffusion(still, grid) == 0.0
 
 
 def test_numbers_that_do_not_exist_are_absent() -> None:
