@@ -60,11 +60,12 @@ class FaceFlow:
 class FlowProblem:
     """Assembled flow operators of a case; advances or balances the mixed vector (u, p).
 
-    One factor belongs to the time step `dt` [s] (backward Euler), one to the steady operator; each is made when first needed.
+    One factor belongs to the time step `dt` [s] (backward Euler), one to the steady operator; each is made when first needed. Steps of a
+    `refined` problem are the same to 1e-12 at every run on as many ranks.
     """
 
-    def __init__(self, case: Case, strip: Strip, dt: float):
-        self.case, self.strip, self.dt = case, strip, float(dt)
+    def __init__(self, case: Case, strip: Strip, dt: float, refined: bool = False):
+        self.case, self.strip, self.dt, self.refined = case, strip, float(dt), refined
         mesh = strip.mesh
         element = basix.ufl.mixed_element(
             [basix.ufl.element("RTCF", "quadrilateral", 1), basix.ufl.element("DQ", "quadrilateral", 0)]
@@ -172,7 +173,9 @@ class FlowProblem:
                     1.0 / self.dt, self.mass_matrix, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
                 )
             matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
-            self._solvers[kind] = DirectSolver(matrix, f"flow ({kind})", symmetric=True)
+            self._solvers[kind] = DirectSolver(
+                matrix, f"flow ({kind})", symmetric=True, refined=self.refined
+            )
         return self._solvers[kind]
 
     # --- solving ---

@@ -113,6 +113,8 @@ class Reactor:
                     self._start(bar)
                     log.info("flow found after %.1f s", clock.monotonic() - begun)
                     self._write(directory, callback, None)
+                    if directory is not None:
+                        checkpoint.write(self, directory)  # the flow may have taken minutes
                 self._march(directory, callback, bar)
             except (ConvergenceError, Interrupted) as error:
                 self._give_up(directory, begun, error)

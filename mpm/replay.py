@@ -77,15 +77,15 @@ class Replay:
 class March:
     """The true transient after an impulsive start: gas at rest when the inlets open at t = 0, the vibration starting later.
 
-    One flow step per time step; `cycle` collects the running mean of the last full cycle.
+    One flow step per time step, refined: a resumed run makes its own factor. `recent` holds the fields of the last full cycle.
     """
 
     def __init__(self, case: Case, strip: Strip, bed: BedMotion, schedule: Schedule):
         self.strip, self.bed, self.schedule = strip, bed, schedule
-        self.problem = FlowProblem(case, strip, schedule.dt)
+        self.problem = FlowProblem(case, strip, schedule.dt, refined=True)
         resting = schedule.step(0).dt
         same = abs(resting - schedule.dt) < 1e-12 * schedule.dt
-        self.resting = self.problem if same else FlowProblem(case, strip, resting)
+        self.resting = self.problem if same else FlowProblem(case, strip, resting, refined=True)
         self.current = FlowField.of(self.problem)
         self.recent: list[FlowField] = []
         self.done = 0  # steps marched

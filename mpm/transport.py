@@ -38,9 +38,8 @@ NEWTON_LIMIT = 30
 FILL = {"resolved": (0, 0), "averaged": (1, 2), "steady": (1, 2)}
 REFACTORED = 2  # Newton iterations of a step with an incomplete factor of their own; afterwards the matrix hardly changes
 RESIDUAL = 1e-12  # sum of |residual| over all cells, relative to the largest feed
-ROUNDING = np.finfo(
-    float
-).eps  # of the sum of what the diagonal carries: a residual below that is rounding, and accepted
+# of the sum of what the diagonal carries: a residual below that is rounding, and accepted
+ROUNDING = float(np.finfo(float).eps)
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
 FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
 LAST = 1e-2 * RESIDUAL  # what the inner tolerance aims at, and no further
