@@ -173,9 +173,7 @@ class FlowProblem:
                     1.0 / self.dt, self.mass_matrix, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
                 )
             matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
-            self._solvers[kind] = DirectSolver(
-                matrix, f"flow ({kind})", symmetric=True, refined=self.refined
-            )
+            self._solvers[kind] = DirectSolver(matrix, f"flow ({kind})", symmetric=True, refined=self.refined)
         return self._solvers[kind]
 
     # --- solving ---
