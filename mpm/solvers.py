@@ -13,7 +13,8 @@ REASONS = {
 
 
 METIS = 5  # MUMPS: nested dissection; its own choice needs 1.8 times the memory here
-SEQUENTIAL_ROOT = 1  # MUMPS: no ScaLAPACK for the last front, which is small in two dimensions: 8 % less memory, as fast
+# MUMPS: no ScaLAPACK for the last front, which is small in two dimensions: 8 % less memory, as fast
+SEQUENTIAL_ROOT = 1
 # MUMPS: per cent of spare workspace, tried in turn: pivoting can need more than was foreseen
 SPARE = (5, 20, 100, 500)
 FACTOR_FAILED = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
