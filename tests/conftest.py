@@ -13,6 +13,7 @@ Under MPI every rank runs the same tests in the same order. What this file adds:
 import importlib.util
 import os
 import shutil
+import signal
 import sys
 import time
 from collections.abc import Generator
@@ -49,7 +50,9 @@ else:
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Silence the report of all ranks but the first."""
+    """Silence the report of all ranks but the first; hear Ctrl-C also where a shell has started the tests in the background."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # what the programs under test would inherit
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if COMM is not None and COMM.rank != 0:
         config.pluginmanager.unregister(name="terminalreporter")
 
