@@ -146,6 +146,7 @@ def tables() -> str:
             front = f"{1e3 * n['front']:.2f}" if "front" in n else ""
             values = f"{n['box_mean']:.4f} | {n['exit_mean']:.4f} | {front} | {1e6 * n['x_CH4']:.2f} | {n['processor_seconds']:.1f}"
             lines.append(f"| {gamma:g} | {speed:g} | {columns:g} | {model} | {values} |")
+    lines += ["", *differences()]
     lines += [
         "",
         "| Gamma | " + " | ".join(f"{name}, K_xx/D, K_yy/D" for name in LAYERS) + " |",
@@ -159,6 +160,24 @@ def tables() -> str:
                 f"| {gamma:g} | " + " | ".join(f"{k[n][0]:.4f}, {k[n][1]:.4f}" for n in LAYERS) + " |"
             )
     return "\n".join(lines)
+
+
+def differences() -> list[str]:
+    """Markdown lines: box mean of the resolved run less that of the averaged one, by mesh."""
+    lines = [
+        "| Gamma | bed, cm/s | "
+        + " | ".join(f"resolved - averaged, columns of {columns:g} mm" for columns in COLUMNS)
+        + " |",
+        "|" + " --- |" * (2 + len(COLUMNS)),
+    ]
+    for gamma, speed in itertools.product(GAMMAS, SPEEDS):
+        cells = []
+        for columns in COLUMNS:
+            paths = [record(model, columns, gamma, speed) for model in ("resolved", "averaged")]
+            found = [json.loads(p.read_text(encoding="utf-8"))["box_mean"] for p in paths if p.exists()]
+            cells.append(f"{found[0] - found[1]:+.4f}" if len(found) == len(paths) else "")
+        lines.append(f"| {gamma:g} | {speed:g} | " + " | ".join(cells) + " |")
+    return lines
 
 
 def main() -> None:
