@@ -224,9 +224,9 @@ def box_mean(lab: Lab) -> Finding:
     why = (
         "Gains are those of the coarse mesh, their mesh error the difference to the medium mesh in the developed state with "
         "inlets fixed to the reactor, where the gain at 6.5 s is "
-        f"{gains['coarse'][-1]:+.4f} on the coarse and {gains['medium'][-1]:+.4f} on the medium mesh. Coverage rides in columns "
-        "that slide as a whole; on columns wider than the swing of the bed (0.34 to 0.67 mm) the swing can spread the coverage "
-        "by up to a column, so a gain that shrinks with the column is the mesh's. A bed that moves faster brings more fresh sites into the "
+        f"{gains['coarse'][-1]:+.4f} on the coarse and {gains['medium'][-1]:+.4f} on the medium mesh. Upwinding of "
+        "the gas that swings adds to diffusion along wide columns, the more so the larger Gamma (docs/open_question.md), "
+        "so a gain that shrinks with the column is the mesh's. A bed that moves faster brings more fresh sites into the "
         "box, but TMA gas that it drags around the periodic strip reaches the box from the other side: at Y 1e-3 the box fills "
         f"up within 20 s at every speed, and the largest reversal of the order is {-falls:.2f}."
     )
