@@ -181,9 +181,10 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
         )
     smeared = report["run"]["numerical_diffusion"]
     if smeared > SMEARED and case.fidelity != "steady":
+        otherwise = ", or fidelity averaged, which has no swinging gas" if case.fidelity == "resolved" else ""
         found.append(
             f"upwinding in columns of {report['mesh']['column_width'] * 1e3:.3g} mm adds {100 * smeared:.2g} per cent to diffusion "
-            "along the bed: narrower columns (geometry.cell_width), or fidelity averaged, which has no swinging gas"
+            f"along the bed: narrower columns (geometry.cell_width){otherwise}"
         )
     slide = case.motion.bed_velocity * Schedule.from_case(case).dt / report["mesh"]["column_width"]
     if case.fidelity == "averaged" and bed and slide > 1.0 + 1e-6:

@@ -34,7 +34,7 @@ def main(arguments: list[str] | None = None) -> int:
         "--coarse", action="store_true", help="everything on the coarsest mesh; the document is not written"
     )
     parser.add_argument(
-        "--finest", action="store_true", help="rows R9, R10, R13 to R18 on the thesis' own mesh (hours)"
+        "--finest", action="store_true", help="rows R9, R10, R13 to R21, R23 on the thesis' own mesh (hours)"
     )
     parser.add_argument(
         "--report",

@@ -124,7 +124,7 @@ def test_what_is_questionable_is_said(case: Case, change: dict[str, object], tex
     assert text in warning
 
 
-def test_steps_that_are_questionable_follow_the_advice(case: Case) -> None:
+def test_the_step_that_the_warning_advises(case: Case) -> None:
     """Fails when the step that the warning names still slides more than a column, or needs two steps for one."""
     assert eng.expected_steps(case.with_({"time.step": "26.2 ms"})) == 2 + math.ceil(
         19.95 / (0.1397 / 411 / 0.013)
