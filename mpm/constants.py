@@ -1,8 +1,9 @@
-"""Constants of nature, SI (CODATA 2018, exact values) and standard gravity."""
+"""Constants of nature, SI (CODATA 2018, exact values), and gravity as the thesis takes it."""
 
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant R [J/mol/K]."""
 AVOGADRO = 6.02214076e23
 """Avogadro constant [1/mol]."""
-GRAVITY = 9.80665
-"""Standard acceleration of gravity [m/s2]; vibration amplitudes are given in multiples of it."""
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s2] of the thesis (section 2.2), in which vibration amplitudes are counted; the standard value is
+9.80665, 0.03 % less."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpm.constants import GRAVITY
 from mpm.cycle import periodic_flow
 from mpm.dispersion import dispersion_tensor, vibrational_dispersion
 from mpm.errors import InputError
@@ -47,7 +48,7 @@ def channel(
     height: float, amplitude: float, omega: float, viscosity: float, diffusivity: float, **mesh: int
 ) -> float:
     """Mean of K_xx over the channel, over D, from the discrete periodic flow; K_yy must vanish."""
-    gamma = amplitude * omega**2 * math.tan(math.pi / 3.0) / 9.80665
+    gamma = amplitude * omega**2 * math.tan(math.pi / 3.0) / GRAVITY
     case = strip_case(
         [{"name": "gas", "height": f"{height!r} m", "cells": mesh["cells"]}],
         length=0.3 * height,

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from mpm.errors import InputError
 
-from .relations import GRAVITY
+from ..constants import GRAVITY
 from .waveform import Harmonic, HarmonicWaveform
 
 NOISE = (

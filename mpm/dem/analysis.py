@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from ..constants import GRAVITY
 from .box import BoxSpec
 from .case import DemCase
 from .cohesion import largest_force
 from .profile import PiecewiseFit, Profile, piecewise_fit
 from .relations import (
-    GRAVITY,
     efficiency,
     granular_bond_number,
     minimum_fluidisation_velocity,

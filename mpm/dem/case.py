@@ -33,10 +33,11 @@ from mpm.units import (
     reject,
 )  # fmt: skip
 
+from ..constants import GRAVITY
 from .accelerometer import fit_record, read_record
 from .powder import POWDERS, Powder
 from .reading import one_line, set_dotted
-from .relations import GRAVITY, ideal_gas_density
+from .relations import ideal_gas_density
 from .waveform import Harmonic, HarmonicWaveform, Sawtooth, Waveform, from_table, seed_table_2_2, sine
 
 Acceleration = Annotated[float, Dimension("m/s^2", "an acceleration", "10.581 m/s^2")]

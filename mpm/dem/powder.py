@@ -6,7 +6,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from .relations import GRAVITY
+from ..constants import GRAVITY
 
 
 @dataclass(frozen=True)

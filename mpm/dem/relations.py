@@ -9,9 +9,7 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq
 
-GRAVITY = 9.81  # m/s2, the value used throughout the seed
-GAS_CONSTANT = 8.314462618  # J/mol/K
-
+from ..constants import GAS_CONSTANT, GRAVITY
 
 # Conveying -----------------------------------------------------------------------------------------
 

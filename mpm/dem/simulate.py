@@ -11,11 +11,11 @@ import numpy as np
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
 
+from ..constants import GRAVITY
 from .base import FLAT, Base, Filling, fit_length, frit_monolayer, loose_filling, sawtooth_baffle
 from .box import Box, BoxSpec, Particles
 from .case import DemCase
 from .gas import GasDrag, slab_solids
-from .relations import GRAVITY
 from .sampling import Recorder
 from .waveform import Waveform
 

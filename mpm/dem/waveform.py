@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from .relations import GRAVITY
+from ..constants import GRAVITY
 
 
 class Waveform(Protocol):
