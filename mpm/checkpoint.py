@@ -16,7 +16,6 @@ from mpm.errors import InputError
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, on_root, total
 from mpm.replay import March, Replay, unpack
-from mpm.schedule import Schedule
 
 if TYPE_CHECKING:
     from mpm.case import Case
@@ -59,7 +58,8 @@ def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
     meta = {
         "time": reactor.time,
         "steps": reactor.steps,
-        "wall": reactor.wall_before,
+        "rows": len(reactor.rows),
+        "wall": reactor.wall,
         "distance": bed.distance,
         "shifted": bed.shifted,
         "species": list(transport.names),
@@ -125,9 +125,7 @@ def check_same_case(directory: RunDirectory, case: Case) -> None:
             f"{directory.path}: the case has changed in {changed[0]} since this run began; accepted with --resume: a later time.end"
         )
     state = directory.read_checkpoint()
-    # a run ends with the first step that reaches its end, so the state may lie up to a step beyond it
-    slack = Schedule.from_case(case).dt
-    if state is not None and case.time.end < state[1]["time"] - slack:
+    if state is not None and case.time.end < state[1]["time"]:
         raise InputError(
             f"{directory.path}: time.end: found {case.time.end:g} s; accepted: not before the restart state at {state[1]['time']:g} s"
         )

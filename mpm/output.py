@@ -207,12 +207,12 @@ class RunDirectory:
         except (OSError, ValueError, KeyError) as error:
             raise InputError(f"{path}: not a checkpoint of mpm ({error})") from error
 
-    def cut_back(self, time: float) -> None:
-        """Drop what was written after `time` [s], the restart state's; later output continues the numbering.
+    def cut_back(self, rows: int) -> None:
+        """Drop all but the first `rows` output times, those of the restart state; later output continues the numbering.
 
         Files that `fields.pvd` does not list any more, and unfinished ones, are deleted.
         """
-        self._steps = [step for step in self.steps if step[0] <= time]
+        self._steps = self.steps[:rows]
         if self.pvd.exists():
             write_atomically(self.pvd, vtu.encode_pvd(self._steps))
         listed = {self.path / name for _, name in self._steps}
@@ -223,7 +223,7 @@ class RunDirectory:
         ]:
             if path not in listed:
                 path.unlink()
-        self._history = [row for row in self._rows() if row["time"] <= time]
+        self._history = self._rows()[:rows]
         if (self.path / "history.csv").exists():
             self._write_history()
 

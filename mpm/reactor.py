@@ -71,6 +71,7 @@ class Reactor:
         self.transport = Transport(case, self.strip, self.bed)
         self.flows: Replay | March | None = None
         self.time, self.steps, self.wall_before = 0.0, 0, 0.0
+        self.begun = clock.monotonic()
         self.numbers: dict[str, float] = {}
         self.rows: list[dict[str, float]] = []
         self.sites_initially = total(comm, self.bed.content())
@@ -93,7 +94,7 @@ class Reactor:
         With `output`, everything the run writes goes there; `resume` continues from its restart state. Raises InputError (directory,
         changed case), ConvergenceError and Interrupted; after the last two the directory is usable and can be resumed.
         """
-        begun = clock.monotonic()
+        self.begun = clock.monotonic()
         directory = self._open(output, resume, overwrite)
         file = directory.log if directory is not None and is_root(self.comm) else None
         with log_file(log, file), Progress(self, progress) as bar, stop_signals(self._request_stop):
@@ -105,23 +106,29 @@ class Reactor:
                 self.comm.size,
             )
             if self.case.fidelity == "steady":
-                return self._run_steady(directory, callback, bar, begun)
+                return self._run_steady(directory, callback, bar)
             try:
                 if self._restored:
                     log.info("resumed at t = %g s, after step %d", self.time, self.steps)
                 else:
                     self._start(bar)
-                    log.info("flow found after %.1f s", clock.monotonic() - begun)
+                    log.info("flow found after %.1f s", self.wall)
                     self._write(directory, callback, None)
                     if directory is not None:
                         checkpoint.write(self, directory)  # the flow may have taken minutes
                 self._march(directory, callback, bar)
             except (ConvergenceError, Interrupted) as error:
-                self._give_up(directory, begun, error)
+                self._give_up(directory, error)
                 raise
-        summary = summarise(self, "done", self.wall_before + clock.monotonic() - begun)
-        self._save(directory, summary, begun)
+        summary = summarise(self, "done", self.wall)
+        if directory is not None:
+            on_root(self.comm, lambda: directory.write_summary(summary))
         return Result(self, summary)
+
+    @property
+    def wall(self) -> float:
+        """Wall time so far [s], of the parts before a restart too."""
+        return self.wall_before + clock.monotonic() - self.begun
 
     def _open(self, output: str | Path | None, resume: bool, overwrite: bool) -> RunDirectory | None:
         """Prepare the directory on rank 0 and read a restart state into every rank."""
@@ -142,16 +149,16 @@ class Reactor:
         if state is not None:
             checkpoint.restore(self, *state)
             self._restored = True
-            cut = self.time
+            rows = state[1]["rows"]
 
             def cut_back() -> dict[str, Floats]:
-                directory.cut_back(cut + 1e-9 * self.schedule.dt)
+                directory.cut_back(rows)
                 return directory.history()
 
             self.rows = checkpoint.rows(on_root(self.comm, cut_back))
             self.numbers = self.rows[-1] if self.rows else {}
         elif resume:
-            on_root(self.comm, lambda: directory.cut_back(-1.0))
+            on_root(self.comm, lambda: directory.cut_back(0))
         return directory if is_root(self.comm) else RunDirectory(output)
 
     def _start(self, bar: Progress) -> None:
@@ -176,9 +183,7 @@ class Reactor:
             )
         return flows
 
-    def _run_steady(
-        self, directory: RunDirectory | None, callback: Callback | None, bar: Progress, begun: float
-    ) -> Result:
+    def _run_steady(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress) -> Result:
         """Find the quasi-steady state; the last iterate is written when that fails."""
 
         def watch(iteration: int, residual: float) -> None:
@@ -199,7 +204,7 @@ class Reactor:
         self.sites_initially = total(self.comm, self.bed.content())
         self.stored_initially = total(self.comm, self.transport.concentration @ self.transport.gas_volume)
         self._write(directory, callback if error is None else None, None)
-        summary = summarise(self, status, clock.monotonic() - begun)
+        summary = summarise(self, status, self.wall)
         if directory is not None:
             on_root(self.comm, lambda: directory.write_summary(summary))
         if error is not None:
@@ -207,14 +212,24 @@ class Reactor:
         return Result(self, summary)
 
     def _march(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress) -> None:
+        """All steps to the end of the case.
+
+        What happens only because the run ends here, a cut step and a row between two output times, comes after the last restart state: a
+        run resumed with a later end is the run of that length.
+        """
         assert self.flows is not None
-        last_checkpoint = clock.monotonic()
+        last_checkpoint, every = clock.monotonic(), self.case.output.every
+        step = self.schedule.step(max(self.schedule.steps - 1, 0))
         for step in self.schedule.from_step(self.steps):
+            if step.cut and directory is not None:
+                checkpoint.write(self, directory)
             self._take(step)
             bar.advance()
-            if self.schedule.is_output(step, self.case.output.every):
+            if self.schedule.is_output(step, every):
                 self._write(directory, callback, step)
                 log.info("%s", bar.line())
+            if self.steps == self.schedule.steps:
+                break
             due = clock.monotonic() - last_checkpoint > self.case.output.checkpoint
             stop, due = largest(self.comm, [self._stop, due and is_root(self.comm)]) > 0.0
             if due and directory is not None:
@@ -222,6 +237,10 @@ class Reactor:
                 last_checkpoint = clock.monotonic()
             if stop:
                 raise Interrupted(f"interrupted at t = {self.time:.6g} s, after step {self.steps}")
+        if directory is not None and not step.cut:
+            checkpoint.write(self, directory)
+        if self.rows[-1]["time"] != self.time:
+            self._write(directory, callback, step)
 
     def _take(self, step: Step) -> None:
         """One step: the bed slides, then gas and coverage follow over the new position."""
@@ -275,22 +294,15 @@ class Reactor:
         if callback is not None:
             callback(self)
 
-    def _save(self, directory: RunDirectory | None, summary: dict[str, Any], begun: float) -> None:
-        if directory is None:
-            return
-        wall = self.wall_before
-        self.wall_before += clock.monotonic() - begun
-        checkpoint.write(self, directory)
-        self.wall_before = wall
-        on_root(self.comm, lambda: directory.write_summary(summary))
-
-    def _give_up(self, directory: RunDirectory | None, begun: float, error: Exception) -> None:
+    def _give_up(self, directory: RunDirectory | None, error: Exception) -> None:
         """Keep the last good state and say in summary.json how the run ended."""
         if directory is None or self.flows is None:
             return
         status = "interrupted" if isinstance(error, Interrupted) else "failed"
         log.error("%s", error)
-        self._save(directory, summarise(self, status, self.wall_before + clock.monotonic() - begun), begun)
+        checkpoint.write(self, directory)
+        summary = summarise(self, status, self.wall)
+        on_root(self.comm, lambda: directory.write_summary(summary))
 
     # --- looking ---
 

@@ -83,7 +83,7 @@ class March:
     def __init__(self, case: Case, strip: Strip, bed: BedMotion, schedule: Schedule):
         self.strip, self.bed, self.schedule = strip, bed, schedule
         self.problem = FlowProblem(case, strip, schedule.dt, refined=True)
-        resting = schedule.step(0).dt
+        resting = schedule.step(0).whole
         same = abs(resting - schedule.dt) < 1e-12 * schedule.dt
         self.resting = self.problem if same else FlowProblem(case, strip, resting, refined=True)
         self.current = FlowField.of(self.problem)
@@ -98,7 +98,7 @@ class March:
         if self.done == step.index:
             problem = self.resting if step.phase == RESTING else self.problem
             problem.set_state(self.current.velocities, self.current.pressure)
-            problem.step(step_motion(self.bed, step.since, step.since + step.dt))
+            problem.step(step_motion(self.bed, step.since, step.since + step.whole))
             self.current = FlowField.of(problem)
             self.done += 1
             self.recent = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor
 from typing import TYPE_CHECKING
 
@@ -21,15 +21,22 @@ class Step:
     """One time step from `t0` over `dt` to `t1` [s]; `phase` numbers it within its cycle, RESTING before the vibration starts.
 
     `since` [s] is its beginning counted from the start of the vibration. `dt` is the same to the last digit for all steps of a kind, which
-    the rounding of t1 - t0 is not: solvers know by it that their matrices still hold.
+    the rounding of t1 - t0 is not: solvers know by it that their matrices still hold. `whole` [s] is `dt` unless the run ends within the
+    step: the velocity field of a step is that of the whole step.
     """
 
     index: int
     t0: float
     t1: float
     dt: float
+    whole: float
     phase: int
     since: float
+
+    @property
+    def cut(self) -> bool:
+        """The run ends within this step."""
+        return self.dt < self.whole
 
 
 def aligned_step(step: float, column: float, speed: float) -> float:
@@ -50,8 +57,8 @@ def aligned_step(step: float, column: float, speed: float) -> float:
 class Schedule:
     """Equal steps of `dt` [s] from the start of the vibration on, `phases` of them per cycle (1: every step is alike).
 
-    Before the start the steps are as equal as they can be and not longer than `dt`, so that the cycle's grid stays aligned. The run
-    ends with the first step that reaches `end`.
+    Before the start the steps are as equal as they can be and not longer than `dt`, so that the cycle's grid stays aligned. The last
+    step is cut so that the run ends at `end`.
     """
 
     dt: float
@@ -83,26 +90,25 @@ class Schedule:
         return rest + max(ceil((self.end - self.start) / self.dt - SLACK), 0)
 
     def step(self, index: int) -> Step:
-        """Step `index`, counted from 0."""
+        """Step `index`, counted from 0; the last one ends at `end`."""
+        step = self._whole_step(index)
+        if index != self.steps - 1:
+            return step
+        dt = self.end - step.t0
+        return replace(step, t1=self.end, dt=dt if dt < step.whole * (1.0 - SLACK) else step.whole)
+
+    def _whole_step(self, index: int) -> Step:
         rest = self.resting_steps
         if index < rest:
             dt = self.start / rest
-            return Step(index, index * dt, (index + 1) * dt, dt, RESTING, index * dt - self.start)
-        k = index - rest
-        return Step(
-            index,
-            self.start + k * self.dt,
-            self.start + (k + 1) * self.dt,
-            self.dt,
-            k % self.phases,
-            k * self.dt,
-        )
+            return Step(index, index * dt, (index + 1) * dt, dt, dt, RESTING, index * dt - self.start)
+        k, dt = index - rest, self.dt
+        return Step(index, self.start + k * dt, self.start + (k + 1) * dt, dt, dt, k % self.phases, k * dt)
 
     def from_step(self, index: int) -> Iterator[Step]:
         """All steps from `index` on."""
         return (self.step(n) for n in range(index, self.steps))
 
     def is_output(self, step: Step, every: float) -> bool:
-        """True when `step` is the last one or reaches a multiple of `every` [s]."""
-        last = step.index == self.steps - 1
-        return last or floor(step.t1 / every + SLACK) > floor(step.t0 / every + SLACK)
+        """True when `step` is the first to reach a multiple of `every` [s]."""
+        return floor(step.t1 / every + SLACK) > floor(step.t0 / every + SLACK)

@@ -137,7 +137,7 @@ def test_cut_back_then_continue(run: RunDirectory, grid: Grid) -> None:
     (run.path / "fields" / "fields_000009.vtu").write_text("written, but not listed yet")
     again = RunDirectory(run.path, precision="Float64")
     again.prepare(resume=True)
-    again.cut_back(TIMES[1])
+    again.cut_back(2)
     assert [t for t, _ in read_pvd(run.pvd)] == TIMES[:2]
     assert list(again.history()["time"]) == TIMES[:2]
     write_run(again, grid, TIMES[2:])
@@ -258,7 +258,7 @@ def test_killed_writer_leaves_readable_files(tmp_path: Path, attempt: int) -> No
     assert stored is not None
     restart = stored[1]["time"]
     assert np.all(stored[0]["theta"] == restart)
-    directory.cut_back(restart)
+    directory.cut_back(int(restart) + 1)
     assert (
         list(directory.history()["time"]) == [t for t, _ in directory.steps] == list(np.arange(restart + 1))
     )

@@ -134,19 +134,34 @@ def test_restart_on_another_number_of_ranks(mode: str, tmp_path: Path) -> None:
     assert total(COMM, [1.0])[0] == COMM.size
 
 
-def test_resume_accepts_a_later_end(tmp_path: Path) -> None:
-    """Fails when a finished run cannot be prolonged, the prolonged one differs from a run of that length, or another change is accepted."""
+@pytest.mark.parametrize("mode", ["averaged", "resolved", "impulsive"])
+def test_resume_accepts_a_later_end(mode: str, tmp_path: Path) -> None:
+    """Fails when a run that ended within a step and between two output times cannot be prolonged, or the prolonged one is not the run of
+    that length to the last digit."""
+    longer = MODES[mode].with_({"time.end": "0.33 s"})
+    _, whole = run(longer)
+    reactor, first = run(longer.with_({"time.end": "0.237 s"}), output=tmp_path / "run")
+    assert first.summary["simulated_seconds"] == first.history["time"][-1] == 0.237
+    assert reactor.schedule.step(reactor.steps - 1).cut
+    assert first.summary["species"]["TMA"]["fed"] == pytest.approx(
+        0.237 / 0.33 * whole.summary["species"]["TMA"]["fed"], rel=1e-9
+    )
+    _, prolonged = run(longer, output=tmp_path / "run", resume=True)
+    assert_same_numbers(whole.summary, prolonged.summary, 0.0)
+    assert whole.history.keys() == prolonged.history.keys()
+    for name, values in whole.history.items():
+        np.testing.assert_array_equal(prolonged.history[name], values, err_msg=name)
+    _, same = run(longer, output=tmp_path / "run", resume=True)
+    assert_same_numbers(whole.summary, same.summary, 0.0)
+
+
+def test_resume_refuses_another_case(tmp_path: Path) -> None:
+    """Fails when an end before the restart state, or another change, is accepted."""
     case = MODES["averaged"]
-    longer = case.with_({"time.end": "0.8 s"})
-    _, whole = run(longer, COMM)
-    run(case, COMM, output=tmp_path / "run")
-    with pytest.raises(InputError, match=r"motion\.gamma"):
-        Reactor(longer.with_({"motion.gamma": 0.4}), COMM).run(output=tmp_path / "run", resume=True)
-    with pytest.raises(InputError, match=r"time\.end"):
-        Reactor(case.with_({"time.end": "0.3 s"}), COMM).run(output=tmp_path / "run", resume=True)
-    _, prolonged = run(longer, COMM, output=tmp_path / "run", resume=True)
-    assert_same_numbers(whole.summary, prolonged.summary, 1e-12)
-    np.testing.assert_allclose(prolonged.history["time"], whole.history["time"], atol=1e-12)
+    run(case, output=tmp_path / "run")
+    for key, value in {"motion.gamma": 0.4, "time.end": "0.3 s"}.items():
+        with pytest.raises(InputError, match=key.replace(".", r"\.")):
+            Reactor(case.with_({key: value}), MPI.COMM_SELF).run(output=tmp_path / "run", resume=True)
 
 
 def test_resume_of_a_directory_without_a_state_starts_anew(tmp_path: Path) -> None:
