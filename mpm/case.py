@@ -16,7 +16,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PrivateAttr, Strict, ValidationError, WithJsonSchema, model_validator
+from pydantic import (
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    Strict,
+    ValidationError,
+    WithJsonSchema,
+    model_serializer,
+    model_validator,
+)
 
 from mpm.caseio import assemble, built_in_files, find_file, read_toml, write_toml
 from mpm.chemistry import Mechanism
@@ -26,7 +35,7 @@ from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
 from mpm.mechanism import Chemistry, build_mechanism
 from mpm.messages import to_input_error
-from mpm.profile import check_profile
+from mpm.profile import BedProfile, read_profile
 from mpm.units import (
     Angle,
     Density,
@@ -63,6 +72,9 @@ __all__ = [
     "load_case",
 ]
 
+
+SAME_FREQUENCY = 0.01
+"""Relative difference up to which a profile belongs to a vibration: a DEM's waveform may be fitted to a record of the same machine."""
 
 SpeciesDiffusivity = Annotated[
     dict[str, Diffusivity],
@@ -114,9 +126,9 @@ class Motion(Frozen):
     """Vibration of the reactor and conveying of the bed.
 
     gamma: vertical acceleration over g (0: the bed moves steadily at bed_velocity); angle [rad] of the vibration,
-    measured from the horizontal or from the vertical; bed_velocity [m/s]: cycle mean in the reactor's frame;
-    profile: thesis (lift-off at liftoff_velocity), phases (liftoff_phase, contact_phase [rad]), or the path of a CSV
-    file from `mpm dem`; inlet_frame: what the inlets are fixed to; start [s] of the vibration; startup: begin in the
+    measured from the horizontal or from the vertical; bed_velocity [m/s]: cycle mean in the reactor's frame (a profile
+    file brings its own: see `mean_velocity`); profile: thesis (lift-off at liftoff_velocity), phases (liftoff_phase, contact_phase [rad]),
+    or the path of a CSV file from `mpm dem`; inlet_frame: what the inlets are fixed to; start [s] of the vibration; startup: begin in the
     periodic state (developed) or keep the true transient (impulsive).
     """
 
@@ -132,6 +144,18 @@ class Motion(Frozen):
     inlet_frame: Literal["reactor", "lab"] = "reactor"
     start: Instant = 0.05
     startup: Literal["developed", "impulsive"] = "developed"
+
+    _table: BedProfile | None = PrivateAttr(None)
+
+    @property
+    def table(self) -> BedProfile | None:
+        """The profile file's content; None without vibration or with a profile of phases."""
+        return self._table
+
+    @property
+    def mean_velocity(self) -> float:
+        """Cycle mean of the bed's velocity in the reactor's frame [m/s], negative to the left: the profile file's, else `bed_velocity`."""
+        return self.bed_velocity if self._table is None else self._table.mean
 
     @property
     def peak_vertical_velocity(self) -> float:
@@ -170,8 +194,23 @@ class Motion(Frozen):
             if self.liftoff_phase == self.contact_phase:
                 raise reject("the phase of lift-off", "another phase", key="contact_phase")
         else:
-            check_profile(Path(self.profile), "profile")
+            self._table = read_profile(Path(self.profile), "profile")
+            made = self._table.conditions
+            if made is not None and abs(made.frequency - self.frequency) > SAME_FREQUENCY * self.frequency:
+                raise reject(
+                    f"{self.profile}: a profile made at {made.frequency:.6g} Hz for a vibration at {self.frequency:.6g} Hz",
+                    f'a profile made at {self.frequency:.6g} Hz, or frequency = "{made.frequency:.6g} Hz"',
+                    key="profile",
+                )
         return self
+
+    @model_serializer(mode="wrap")
+    def _write_what_rules(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `bed_velocity` where a profile file says how fast the bed moves."""
+        table: dict[str, Any] = handler(self)
+        if self._table is not None:
+            table.pop("bed_velocity", None)
+        return table
 
 
 class Time(Frozen):

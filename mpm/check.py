@@ -7,6 +7,7 @@ from typing import Any
 
 from mpm import engineering as eng
 from mpm.case import Case
+from mpm.caveats import profile_caveats
 from mpm.chemistry import inlet_concentrations
 from mpm.dem.relations import (
     minimum_fluidisation_velocity,
@@ -72,7 +73,7 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def _motion(case: Case) -> dict[str, float | None]:
+def _motion(case: Case) -> dict[str, float | str | None]:
     vibration = Vibration.from_motion(case.motion)
     return {
         "gamma": case.motion.gamma,
@@ -83,7 +84,10 @@ def _motion(case: Case) -> dict[str, float | None]:
         "peak_velocity_y": vibration.ay * vibration.omega,
         "straight_drop": straight_drop_velocity(vibration.ax, case.motion.frequency),
         "perfect_flight": perfect_flight_velocity(vibration.ax, case.motion.frequency),
-        "bed_velocity": case.motion.bed_velocity,
+        "bed_velocity": case.motion.mean_velocity,
+        "bed_velocity_from": "motion.bed_velocity"
+        if case.motion.table is None
+        else f"mean of {case.motion.profile}",
     }
 
 
@@ -131,8 +135,8 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
         "spreading_length": eng.spreading_length(case),
         "pressure_drop": gas.viscosity * rising * bed.height / material.permeability[1],
     }
-    if case.motion.bed_velocity > 0.0:
-        numbers["residence_time"] = geometry.length / case.motion.bed_velocity
+    if case.motion.mean_velocity != 0.0:
+        numbers["residence_time"] = geometry.length / abs(case.motion.mean_velocity)
     if material.particle_diameter is not None:
         numbers["Re_particle"] = eng.reynolds(gas.density, rising, material.particle_diameter, gas.viscosity)
         if material.density is not None:
@@ -154,11 +158,12 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
 
 def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     """What is legal but questionable, one sentence each."""
-    found = []
+    found = profile_caveats(case)
     motion, bed = report["motion"], report.get("bed", {})
-    if case.motion.gamma > 0.0 and bed and case.motion.bed_velocity > motion["perfect_flight"]:
+    speed = abs(case.motion.mean_velocity)
+    if case.motion.gamma > 0.0 and bed and speed > motion["perfect_flight"]:
         found.append(
-            f"the bed is conveyed at {case.motion.bed_velocity * 100:.3g} cm/s, above perfect flight, "
+            f"the bed is conveyed at {speed * 100:.3g} cm/s, above perfect flight, "
             f"{motion['perfect_flight'] * 100:.3g} cm/s: no particle hops that fast"
         )
     ratio = bed.get("gas_over_minimum_fluidisation", 0.0)
@@ -186,10 +191,10 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
             f"upwinding in columns of {report['mesh']['column_width'] * 1e3:.3g} mm adds {100 * smeared:.2g} per cent to diffusion "
             f"along the bed: narrower columns (geometry.cell_width){otherwise}"
         )
-    slide = case.motion.bed_velocity * Schedule.from_case(case).dt / report["mesh"]["column_width"]
+    slide = speed * Schedule.from_case(case).dt / report["mesh"]["column_width"]
     if case.fidelity == "averaged" and bed and slide > 1.0 + 1e-6:
         found.append(
             f"the bed moves {slide:.2g} columns in a step, which leaves stripes of single columns in the coverage: lower time.step "
-            f"to {math.ceil(1e4 * report['mesh']['column_width'] / case.motion.bed_velocity) / 10:g} ms"
+            f"to {math.ceil(1e4 * report['mesh']['column_width'] / speed) / 10:g} ms"
         )
     return found

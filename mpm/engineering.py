@@ -33,8 +33,10 @@ def excess_number(
     surface_to_volume: float,
     site_density: float,
 ) -> float:
-    """Precursor molecules fed per surface site that passes, gamma = v w C / (u_bed h S n_s) (thesis, 5-20)."""
-    return velocity * width * concentration / (bed_velocity * bed_height * surface_to_volume * site_density)
+    """Precursor molecules fed per surface site that passes, gamma = v w C / (|u_bed| h S n_s) (thesis, 5-20)."""
+    return (
+        velocity * width * concentration / (abs(bed_velocity) * bed_height * surface_to_volume * site_density)
+    )
 
 
 def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float] | None:
@@ -43,7 +45,7 @@ def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float] | None:
     The dose ratio is the excess number over what saturation needs: 1 molecule per site for TMA, 1.5 for water.
     """
     bed = case.geometry.moving_layer
-    if bed is None or bed.material is None or case.motion.bed_velocity == 0.0:
+    if bed is None or bed.material is None or case.motion.mean_velocity == 0.0:
         return None
     sites = bed.material.surface_to_volume * bed.material.site_density
     for species, concentration in inlet_concentrations(
@@ -55,7 +57,7 @@ def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float] | None:
                 inlet.velocity,
                 inlet.width,
                 concentration,
-                case.motion.bed_velocity,
+                case.motion.mean_velocity,
                 bed.height,
                 bed.material.surface_to_volume,
                 bed.material.site_density,
@@ -178,7 +180,7 @@ def numerical_diffusion(case: Case, grid: Grid) -> float:
     Pe = v dx tau^2 / D of a column, with the speed v at which gas may pass the columns of the mesh: that of the bed, which takes its gas
     along, and the reactor's peak velocity where every phase is resolved. About Pe^2/12 in fine meshes.
     """
-    vibration, speed = Vibration.from_motion(case.motion), abs(case.motion.bed_velocity)
+    vibration, speed = Vibration.from_motion(case.motion), abs(case.motion.mean_velocity)
     if case.fidelity == "resolved":
         speed += vibration.ax * vibration.omega
     slowest = min(case.gas.diffusivity.values(), default=0.0)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from mpm.chemistry import inlet_concentrations
 from mpm.diagnostics import State, Totals, conveyed_layer, dosed_species, running_gas, running_surface
 from mpm.geometry import Grid
-from mpm.motion import BedMotion
 
 if TYPE_CHECKING:
     from mpm.case import Case, Inlet
@@ -229,7 +228,7 @@ def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[
         assert layer.material is not None
         length = grid.length
         if layer.moving and case.fidelity == "steady":
-            length = BedMotion(case.motion).mean
+            length = abs(case.motion.mean_velocity)
         elif layer.moving:
             length = totals.slid - (before.slid if before else 0.0)
         area = layer.material.surface_to_volume * layer.height * length

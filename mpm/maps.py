@@ -116,7 +116,7 @@ def map_figure(
 
 
 def moves_right(case: Case) -> bool:
-    return any(layer.moving for layer in case.geometry.layers) and case.motion.bed_velocity > 0.0
+    return any(layer.moving for layer in case.geometry.layers) and case.motion.mean_velocity > 0.0
 
 
 def draw_layers(axes: Axes, case: Case, grid: Grid, inches: float) -> None:

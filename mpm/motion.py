@@ -1,16 +1,15 @@
 """How the reactor and the bed move: vibration, the bed's piecewise velocity, and their integrals over time steps.
 
 The mesh rides rigidly on the reactor, displaced by X(t) = (A_x, A_y) sin(w t) with A_y = Gamma g / w^2; `t` counts from the start of
-the vibration. Solids move with the reactor in contact and at constant velocity in flight. Everything that drives the gas or the bed
-is given as a mean over a time step, so that sums over a cycle are exact whatever the number of steps.
+the vibration. Along x solids move with the reactor in contact and at constant velocity in flight (or as a table says); along y they are
+locked to the reactor all the time, so the bed neither lifts nor loosens. Everything that drives the gas or the bed is given as a mean
+over a time step, so that sums over a cycle are exact whatever the number of steps.
 """
 
 from __future__ import annotations
 
-import csv
 import itertools
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -113,7 +112,8 @@ def flight_velocity(vibration: Vibration, liftoff: float, contact: float, mean: 
 class BedMotion:
     """Position of the bed relative to the reactor (the mesh), s(t) [m], from the start of the vibration.
 
-    `mean` [m/s] is the mean conveying velocity. `at(t)` gives s(t) exactly; v_s averaged over a step is (s(t1) - s(t0)) / (t1 - t0).
+    `mean` [m/s] is the mean conveying velocity, negative to the left (`Motion.mean_velocity`). `at(t)` gives s(t) exactly; v_s averaged
+    over a step is (s(t1) - s(t0)) / (t1 - t0).
     """
 
     def __init__(self, motion: Motion):
@@ -121,11 +121,9 @@ class BedMotion:
         self.start = motion.start
         self.flight: Flight | None = None
         self._table: tuple[Floats, Floats, Floats] | None = None
-        self.mean = 0.0
-        if motion.gamma == 0.0:
-            self.mean = motion.bed_velocity
-        elif motion.profile in ("thesis", "phases"):
-            self.mean = motion.bed_velocity
+        self.mean = motion.mean_velocity
+        table = motion.table
+        if motion.gamma > 0.0 and table is None:
             if motion.profile == "thesis":
                 liftoff, contact = thesis_phases(self.vibration, motion.liftoff_velocity)
             else:
@@ -134,13 +132,12 @@ class BedMotion:
             self.flight = Flight(
                 liftoff, contact, flight_velocity(self.vibration, liftoff, contact, self.mean)
             )
-        else:
-            phase, velocity = read_profile(Path(motion.profile))
+        elif table is not None:
+            phase, velocity = np.array(table.phase), np.array(table.velocity)
             distance = np.concatenate(
                 [[0.0], np.cumsum(0.5 * np.diff(phase) * (velocity[1:] + velocity[:-1]))]
             )
             self._table = (phase, velocity, distance / self.vibration.omega)
-            self.mean = float(distance[-1] / TURN)
 
     @property
     def moving(self) -> bool:
@@ -223,24 +220,3 @@ def step_motion(bed: BedMotion, t0: float, t1: float) -> StepMotion:
         (vibration.displacement(t1)[1] - vibration.displacement(t0)[1]) / dt,
         slide,
     )
-
-
-def read_profile(path: Path) -> tuple[Floats, Floats]:
-    """Phase [rad, from 0 to 2 pi] and lab-frame bed velocity u_x [m/s] of a profile written by `mpm dem`.
-
-    The first point is repeated one turn later, so that linear interpolation closes the cycle.
-    """
-    lines = [
-        line for line in path.read_text(encoding="utf-8").splitlines() if line.strip() and line[0] != "#"
-    ]
-    table = list(csv.DictReader(lines, skipinitialspace=True))
-    phase = np.radians([float(row["phase_deg"]) for row in table])
-    velocity = np.array([float(row["u_x_m/s"]) for row in table])
-    inside = (phase >= 0.0) & (phase < TURN * (1.0 - 1e-12))
-    phase, velocity = phase[inside], velocity[inside]
-    order = np.argsort(phase)
-    phase, velocity = phase[order], velocity[order]
-    at_zero = float(np.interp(0.0, [phase[-1] - TURN, phase[0]], [velocity[-1], velocity[0]]))
-    if phase[0] > 0.0:
-        phase, velocity = np.insert(phase, 0, 0.0), np.insert(velocity, 0, at_zero)
-    return np.append(phase, TURN), np.append(velocity, velocity[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -108,7 +109,8 @@ def _number_table(case: Case, report: dict[str, Any]) -> Table:
     row("peak velocity, horizontal (perfect flight)", motion["perfect_flight"], "cm/s", 1e2)
     row("peak velocity, vertical", motion["peak_velocity_y"], "cm/s", 1e2)
     row("straight drop limit", motion["straight_drop"], "cm/s", 1e2)
-    row("bed velocity", motion["bed_velocity"], "cm/s", 1e2)
+    mean = "" if case.motion.table is None else f", mean of {Path(case.motion.profile).name}"
+    row(f"bed velocity{mean}", motion["bed_velocity"], "cm/s", 1e2)
     row("time of the bed in the strip", bed.get("residence_time"), "s")
     row("gas rising through the bed, at most", bed.get("gas_velocity"), "cm/s", 1e2)
     row("minimum fluidisation, Ergun", bed.get("minimum_fluidisation_ergun"), "cm/s", 1e2)

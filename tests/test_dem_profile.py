@@ -14,11 +14,11 @@ from mpm.dem.base import FLAT, frit_monolayer, loose_filling, sawtooth_baffle, t
 from mpm.dem.case import load_case
 from mpm.dem.gas import GasDrag, slab_solids
 from mpm.dem.powder import POWDERS
-from mpm.dem.profile import HEADER, Profile, piecewise_fit, scaled_to_mean
+from mpm.dem.profile import HEADER, Profile, conditions, piecewise_fit, scaled_to_mean
 from mpm.dem.relations import minimum_fluidisation_velocity
-from mpm.dem.waveform import sine
+from mpm.dem.waveform import Sawtooth, sine
 from mpm.errors import InputError
-from mpm.motion import read_profile
+from mpm.profile import read_profile
 
 WAVE = sine(0.3, 16.0, math.radians(60))
 N = 128
@@ -64,10 +64,19 @@ def test_reactor_reads_the_profile(tmp_path):
     path = tmp_path / "profile.csv"
     curve.write(path, ["a remark", "SCALED: another"])
     assert path.read_text().splitlines()[0] == HEADER
-    phase, velocity = read_profile(path)
-    assert np.trapezoid(velocity, phase) / (2 * np.pi) == pytest.approx(curve.mean, rel=1e-6)
+    assert read_profile(path).mean == pytest.approx(curve.mean, rel=1e-6)
     rows = [r for r in csv.reader(path.open()) if not r[0].startswith("#")]
     assert len(rows) == N + 1
+
+
+def test_a_profile_says_what_it_was_made_with(tmp_path):
+    """Fails when the reactor reads other conditions than the DEM vibrated under, or takes a sawtooth for a sine."""
+    path = tmp_path / "profile.csv"
+    ideal_curve(97.85, 18.71, 0.01435).write(path, ["a remark", conditions(WAVE, "harmonics").line()])
+    made = read_profile(path).conditions
+    assert (made.frequency, made.waveform) == (16.0, "sine")
+    assert (made.gamma, made.angle) == pytest.approx((0.3, math.radians(60.0)), rel=1e-6)
+    assert conditions(Sawtooth(1e-4, 2e-4, 20.0), "sawtooth").waveform == "sawtooth"
 
 
 def test_flight_interval_interpolates_and_wraps():

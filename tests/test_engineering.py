@@ -49,6 +49,51 @@ def test_excess_number(
     assert ratio == excess
 
 
+def profile_case(path: Path, mean: float, comment: str = "", **motion: object) -> Case:
+    """The zone with a profile file of this mean [m/s]."""
+    rows = "".join(f"{p},{mean + 0.01 * math.cos(math.radians(p))!r},0,1\n" for p in range(0, 360, 5))
+    path.write_text(f"phase_deg,u_x_m/s,u_y_m/s,contact\n{comment}{rows}")
+    return load_case(EXAMPLE, {"motion.profile": str(path), **{f"motion.{k}": v for k, v in motion.items()}})
+
+
+@pytest.mark.parametrize("mean", [0.026, -0.026])
+def test_a_profile_sets_the_speed_of_all_engineering_numbers(tmp_path: Path, mean: float) -> None:
+    """Fails when `motion.bed_velocity` enters excess number, dose ratio or residence time of a bed moved by a file, in either direction."""
+    case = profile_case(tmp_path / "p.csv", mean)
+    report = check_case(case)
+    assert report["inlets"]["tma"]["excess_number"] == pytest.approx(
+        0.8955, abs=2e-4
+    )  # half that at 1.3 cm/s
+    assert report["inlets"]["tma"]["dose_ratio"] == report["inlets"]["tma"]["excess_number"]
+    assert report["bed"]["residence_time"] == pytest.approx(0.1397 / 0.026, rel=1e-9)
+    assert report["motion"]["bed_velocity"] == pytest.approx(mean, rel=1e-9)
+    assert report["motion"]["bed_velocity_from"] == f"mean of {tmp_path / 'p.csv'}"
+
+
+MADE = '# conditions = { frequency = "16 Hz", gamma = 0.3, angle = "60 deg", waveform = "sine" }\n'
+
+
+@pytest.mark.parametrize(
+    ("comment", "motion", "texts"),
+    [
+        (MADE, {}, ["motion.bed_velocity, 1.3 cm/s, has no effect: the bed moves as p.csv says, 1 cm/s"]),
+        ("# by hand\n", {}, ["has no effect", "does not say under which vibration it was made"]),
+        (MADE, {"gamma": 0.4}, ["has no effect", "made at gamma 0.3, the reactor vibrates at 0.4"]),
+        (MADE, {"angle": "45 deg"}, ["has no effect", "made at 60 deg from the horizontal, the reactor vibrates at 45 deg"]),
+        (MADE, {"angle": "30 deg", "angle_from": "vertical"}, ["has no effect"]),
+        (MADE.replace("sine", "sawtooth"), {"gamma": 0.4}, ["has no effect", "made with a sawtooth waveform"]),
+        (MADE, {"gamma": 0.0}, ["motion.profile, p.csv, has no effect: without vibration"]),
+    ],
+)  # fmt: skip
+def test_a_profile_that_does_not_belong_is_said(
+    tmp_path: Path, comment: str, motion: dict[str, object], texts: list[str]
+) -> None:
+    """Fails when a profile of another vibration, or a bed speed without effect, passes without a word, or one that belongs does not."""
+    found = check_case(profile_case(tmp_path / "p.csv", 0.01, comment, **motion))["warnings"]
+    assert len(found) == len(texts)
+    assert all(text in warning for text, warning in zip(texts, found, strict=True))
+
+
 def test_dose_ratio_of_water_counts_three_molecules_for_two_sites() -> None:
     cycle = load_case("single_cycle")
     found = {i.name: eng.inlet_excess(cycle, i) for i in cycle.geometry.inlets}

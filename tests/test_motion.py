@@ -1,5 +1,6 @@
 """Vibration, the piecewise bed velocity, and their means over time steps."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.integrate import quad
 from mpm.case import Motion
 from mpm.errors import InputError
 from mpm.motion import REST, TURN, BedMotion, Vibration, step_motion, thesis_phases
+from mpm.profile import read_profile
 
 # bed_velocity_reconstruction.csv of the project's reference numbers (classic conveyor theory, worked out without mpm, g = 9.81 m/s2):
 # Gamma, mean [cm/s], lift-off [deg], contact [deg], share of the cycle in flight, flight velocity, peak velocities x and y [m/s].
@@ -154,3 +156,58 @@ def test_liftoff_faster_than_the_reactor() -> None:
     for velocity in (-0.05, 0.0, 0.01):
         with pytest.raises(InputError, match="liftoff_velocity"):
             thesis_phases(vibration, velocity)
+
+
+CONDITIONS = '# conditions = { frequency = "16 Hz", gamma = 0.3, angle = "60 deg", waveform = "sine" }\n'
+
+
+def profile_file(path: Path, mean: float, comment: str = "") -> Path:
+    """A profile of 2 cm/s cos + `mean` [m/s] with a comment line, as `mpm dem` writes it."""
+    rows = (f"{p},{mean + 0.02 * math.cos(math.radians(p))!r},0,1" for p in range(0, 360, 10))
+    path.write_text(f"phase_deg,u_x_m/s,u_y_m/s,contact\n{comment}" + "\n".join(rows) + "\n")
+    return path
+
+
+def test_a_profile_of_another_frequency_is_refused(tmp_path: Path) -> None:
+    """Fails when a profile made at 20 Hz drives a reactor at 16 Hz, or one made at 16.1 Hz (a fit to a record) does not."""
+    path = str(profile_file(tmp_path / "p.csv", 0.01, CONDITIONS.replace("16 Hz", "20 Hz")))
+    with pytest.raises(
+        ValueError, match=r"made at 20 Hz for a vibration at 16 Hz.*accepted: a profile made at 16 Hz"
+    ):
+        Motion(gamma=0.3, profile=path)
+    assert bed(profile=path, frequency="20 Hz").mean == pytest.approx(0.01)
+    near = str(profile_file(tmp_path / "near.csv", 0.01, CONDITIONS.replace("16 Hz", "16.1 Hz")))
+    assert bed(profile=near).mean == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        CONDITIONS.replace("gamma", "gama"),
+        CONDITIONS.replace("16 Hz", "16 mm"),
+        CONDITIONS.replace("}", ""),
+        CONDITIONS + CONDITIONS,
+    ],
+    ids=["unknown key", "wrong unit", "no TOML", "twice"],
+)
+def test_conditions_that_cannot_be_read_are_refused(tmp_path: Path, comment: str) -> None:
+    """Fails when a damaged line of conditions counts as none."""
+    with pytest.raises(ValueError, match="accepted: one line such as # conditions ="):
+        read_profile(profile_file(tmp_path / "p.csv", 0.01, comment))
+
+
+def test_mean_velocity_is_that_of_what_moves_the_bed(tmp_path: Path) -> None:
+    """Fails when anything but the profile file sets the speed, its sign is lost, or a resolved case names a speed without effect."""
+    path = str(profile_file(tmp_path / "p.csv", -0.01))
+    motion = Motion.model_validate({"gamma": 0.3, "profile": path, "bed_velocity": "5 cm/s"})
+    assert (
+        motion.mean_velocity == pytest.approx(-0.01, rel=1e-12)
+        and BedMotion(motion).mean == motion.mean_velocity
+    )
+    assert "bed_velocity" not in motion.model_dump(mode="json")
+    still = Motion.model_validate({"gamma": 0.0, "profile": path, "bed_velocity": "5 cm/s"})
+    assert still.mean_velocity == BedMotion(still).mean == 0.05
+    assert (
+        Motion.model_validate({"bed_velocity": "5 cm/s"}).model_dump(mode="json")["bed_velocity"]
+        == "0.05 m/s"
+    )

@@ -7,8 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from mpm.files import write_atomically
+from mpm.profile import Conditions
+
+from .relations import GRAVITY
+from .waveform import Waveform, peak_displacement
 
 HEADER = "phase_deg,u_x_m/s,u_y_m/s,contact"
+SINE = 0.02
+"""Share of its amplitude by which a displacement may differ from a sine: what a reactor that vibrates in one would not notice."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +35,30 @@ class Profile:
         return float(self.velocity[0].mean())
 
     def write(self, path: Path, remarks: Sequence[str]) -> None:
-        """Write the table; the remarks follow the header as comment lines."""
+        """Write the table; the remarks, of which one tells the `conditions`, follow the header as comment lines."""
         rows = np.column_stack([self.phase, *self.velocity, self.contact])
         lines = [HEADER, *(f"# {line}" for line in remarks)]
         lines += [",".join(f"{value:.9g}" for value in row) for row in rows]
         write_atomically(path, "\n".join(lines) + "\n")
+
+
+def conditions(waveform: Waveform, kind: str, samples: int = 4096) -> Conditions:
+    """What a profile must be used with: frequency, largest vertical acceleration over g, angle of the displacement from the base.
+
+    The reactor vibrates in a sine along a line. Where the waveform does so to SINE of its amplitudes it is called one, else by `kind`, its
+    word in the powder file. Of a sine the numbers are those of the powder file.
+    """
+    t = np.arange(samples) / samples / waveform.frequency
+    peaks = np.array(peak_displacement(waveform, samples))
+    off = waveform.displacement(t) - peaks[:, None] * np.sin(2.0 * np.pi * waveform.frequency * t)
+    is_sine = bool((np.abs(off).max(axis=1) <= SINE * peaks).all())
+    gamma = float(np.abs(waveform.acceleration(t)[1]).max()) / GRAVITY
+    return Conditions.model_construct(
+        frequency=waveform.frequency,
+        gamma=gamma,
+        angle=float(np.arctan2(peaks[1], peaks[0])),
+        waveform="sine" if is_sine else kind,
+    )
 
 
 @dataclass(frozen=True)

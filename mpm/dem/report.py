@@ -14,7 +14,7 @@ from mpm.files import write_atomically
 from .analysis import Results
 from .box import BoxSpec, Particles
 from .case import DemCase
-from .profile import scaled_to_mean
+from .profile import conditions, scaled_to_mean
 from .waveform import HarmonicWaveform, Waveform
 
 BASE, BED, FIT = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito: stay apart for colour-blind readers
@@ -42,11 +42,14 @@ def write_summary(directory: Path, summary: Mapping[str, Any]) -> None:
 def write_tables(directory: Path, case: DemCase, results: Results, waveform: Waveform) -> None:
     """profile.csv, its fit, the scaled profile when asked, voidage.csv, depth.csv, residence_times.csv."""
     mean = case.profile.mean_velocity
-    about = f"{case.title}: DEM, seeds {', '.join(map(str, case.run.seeds))}, {waveform.frequency:g} Hz"
+    about = (
+        f"{case.title}: DEM, seeds {', '.join(map(str, case.run.seeds))}, {waveform.frequency:g} Hz",
+        conditions(waveform, case.waveform.kind).line(),
+    )
     results.curve.write(
         directory / "profile.csv",
         [
-            about,
+            *about,
             f"cycle mean of u_x {results.curve.mean:.6g} m/s; phase 0: reactor at mean position, moving up",
         ],
     )
@@ -54,7 +57,7 @@ def write_tables(directory: Path, case: DemCase, results: Results, waveform: Wav
     results.fit.profile.write(
         directory / "profile_fit.csv",
         [
-            about,
+            *about,
             f"piecewise fit: base velocity in contact, flight at u_x = {fit.flight[0]:.6g} m/s from "
             f"{fit.liftoff:.2f} to {fit.contact:.2f} deg; rms difference to profile.csv {fit.rms:.3g} m/s",
         ],
@@ -64,7 +67,7 @@ def write_tables(directory: Path, case: DemCase, results: Results, waveform: Wav
         scaled.profile.write(
             directory / "profile_scaled.csv",
             [
-                about,
+                *about,
                 f"SCALED: phases of profile_fit.csv, flight velocity changed from {fit.flight[0]:.6g} to "
                 f"{scaled.flight[0]:.6g} m/s so that the cycle mean is the prescribed {mean:.6g} m/s",
             ],
