@@ -52,6 +52,10 @@ class ConvergenceError(MpmError):
     exit_status = 3
 
 
+class BalanceError(ConvergenceError):
+    """What came in, went out, reacted and stayed does not add up; the message says of what and by how much."""
+
+
 class Interrupted(MpmError):
     """The run was asked to stop (Ctrl-C, SIGTERM); what was written is usable and `--resume` continues it."""
 

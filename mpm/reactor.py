@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm import checkpoint, fem  # noqa: F401  (fem first: it loads the finite-element stack)
+from mpm.balances import LIMIT, require_balance, worst_balance
 from mpm.bed import Bed
 from mpm.diagnostics import State, Totals, total_concentration
 from mpm.dispersion import vibrational_dispersion
-from mpm.errors import ConvergenceError, InputError, Interrupted
+from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
 from mpm.output import RunDirectory
@@ -117,6 +118,7 @@ class Reactor:
                     if directory is not None:
                         checkpoint.write(self, directory)  # the flow may have taken minutes
                 self._march(directory, callback, bar)
+                require_balance(self.case, self.totals())
             except (ConvergenceError, Interrupted) as error:
                 self._give_up(directory, error)
                 raise
@@ -184,7 +186,7 @@ class Reactor:
         return flows
 
     def _run_steady(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress) -> Result:
-        """Find the quasi-steady state; the last iterate is written when that fails."""
+        """Find the quasi-steady state; the last iterate is written when that fails or is out of balance."""
 
         def watch(iteration: int, residual: float) -> None:
             bar.say(f"steady state, Newton step {iteration}, residual {residual:.1e} of the feed")
@@ -193,16 +195,23 @@ class Reactor:
         self._start(bar)
         assert self.flows is not None
         problem = SteadyProblem(self, 0, watch)
+        error: ConvergenceError | Interrupted | None = None
         try:
             problem.solve()
-            status, error = "done", None
         except (ConvergenceError, Interrupted) as stopped:
-            status, error = ("interrupted" if isinstance(stopped, Interrupted) else "failed"), stopped
-            log.error("%s", stopped)
+            error = stopped
         problem.settle_accounts()
         self.steps = problem.iterations
         self.sites_initially = total(self.comm, self.bed.content())
         self.stored_initially = total(self.comm, self.transport.concentration @ self.transport.gas_volume)
+        try:
+            if error is None:
+                require_balance(self.case, self.totals())
+        except BalanceError as unbalanced:
+            error = unbalanced
+        if error is not None:
+            log.error("%s", error)
+        status = "done" if error is None else "interrupted" if isinstance(error, Interrupted) else "failed"
         self._write(directory, callback if error is None else None, None)
         summary = summarise(self, status, self.wall)
         if directory is not None:
@@ -222,7 +231,7 @@ class Reactor:
         step = self.schedule.step(max(self.schedule.steps - 1, 0))
         for step in self.schedule.from_step(self.steps):
             if step.cut and directory is not None:
-                checkpoint.write(self, directory)
+                self._keep(directory)
             self._take(step)
             bar.advance()
             if self.schedule.is_output(step, every):
@@ -233,12 +242,12 @@ class Reactor:
             due = clock.monotonic() - last_checkpoint > self.case.output.checkpoint
             stop, due = largest(self.comm, [self._stop, due and is_root(self.comm)]) > 0.0
             if due and directory is not None:
-                checkpoint.write(self, directory)
+                self._keep(directory)
                 last_checkpoint = clock.monotonic()
             if stop:
                 raise Interrupted(f"interrupted at t = {self.time:.6g} s, after step {self.steps}")
         if directory is not None and not step.cut:
-            checkpoint.write(self, directory)
+            self._keep(directory)
         if self.rows[-1]["time"] != self.time:
             self._write(directory, callback, step)
 
@@ -294,13 +303,19 @@ class Reactor:
         if callback is not None:
             callback(self)
 
+    def _keep(self, directory: RunDirectory) -> None:
+        """Write the restart state. Raises BalanceError when it is out of balance: then the last good one stays."""
+        require_balance(self.case, self.totals())
+        checkpoint.write(self, directory)
+
     def _give_up(self, directory: RunDirectory | None, error: Exception) -> None:
         """Keep the last good state and say in summary.json how the run ended."""
         if directory is None or self.flows is None:
             return
         status = "interrupted" if isinstance(error, Interrupted) else "failed"
         log.error("%s", error)
-        checkpoint.write(self, directory)
+        if worst_balance(self.case, self.totals())[1] <= LIMIT:
+            checkpoint.write(self, directory)
         summary = summarise(self, status, self.wall)
         on_root(self.comm, lambda: directory.write_summary(summary))
 

@@ -21,6 +21,7 @@ from mpm.parallel import largest, total
 from mpm.replay import Replay
 from mpm.solvers import DirectSolver
 from mpm.steady_system import LAST_STEP, SteadySystem
+from mpm.tracers import steady_fields
 
 if TYPE_CHECKING:
     from mpm.reactor import Reactor
@@ -77,13 +78,11 @@ class SteadyProblem(SteadySystem):
         if self._solver is None:
             self._solver = DirectSolver(matrix, "steady state")
             self._x, self._y = matrix.createVecs()
-        self._y.array[:] = np.concatenate([gas.T.ravel(), coverage.T.ravel()])
+        self._y.array[:] = np.concatenate([gas.T.ravel(), coverage.T.ravel(), np.zeros(self.held)])
         self._solver.solve(self._y, self._x)
-        split = self.b * self.own
-        predicted = self.concentration - share * self._x.array[:split].reshape(self.own, self.b).T
-        leaving = (
-            self.theta[: self.free, self.moving] - share * self._x.array[split:].reshape(-1, self.free).T
-        )
+        gas_step, coverage_step = np.split(self._x.array[: self.local - self.held], [self.b * self.own])
+        predicted = self.concentration - share * gas_step.reshape(self.own, self.b).T
+        leaving = self.theta[: self.free, self.moving] - share * coverage_step.reshape(-1, self.free).T
         leaving = np.clip(leaving, 0.0, 1.0)
         leaving = np.vstack([leaving, np.maximum(1.0 - leaving.sum(axis=0), 0.0)])
         self.theta = self.theta.copy()
@@ -180,12 +179,12 @@ class SteadyProblem(SteadySystem):
         events = parts["rates"] * transport.active_area
         gas_events = parts["gas_rates"] * transport.gas_volume
         transport.concentration[: self.b] = self.concentration
-        for i in range(self.b, len(transport.names)):
-            drawn = transport.outlet_means(self.operators, transport.concentration)
-            supply = transport.supply(self.operators, self.shares, drawn)[i]
-            supply[bed.cells] += transport.nu_surface[:, i] @ events
-            supply += transport.nu_gas[:, i] @ gas_events
-            transport.concentration[i] = transport.solve_steady(i, self.operators[i], supply)
+        supply = transport.supply(self.operators, self.shares, {})
+        supply[:, bed.cells] += transport.nu_surface.T @ events
+        supply += transport.nu_gas.T @ gas_events
+        transport.concentration[self.b :] = steady_fields(
+            transport, self.operators[self.b :], supply[self.b :]
+        )
         drawn = transport.outlet_means(self.operators, transport.concentration)
         transport.book(self.operators, 1.0, self.shares, drawn, events, gas_events)
         bed.theta = self.theta.copy()

@@ -6,8 +6,8 @@
 
 The coverage is integrated exactly along the bed: solids that cross a cell of width h at its concentration leave with
 theta_out = theta_in exp(-nu_s k C h/(v_s n_s)) (one reaction; `SurfaceKinetics.conveyed` for two). Unknowns are the concentrations of the
-reacting species and theta_out of every moving cell. A storage term over a pseudo-time step [s] can be added; over LAST_STEP it is
-below rounding.
+reacting species, theta_out of every moving cell and, where outlets draw gas back in, what that gas holds: the mean of the cells next to
+each outlet. A storage term over a pseudo-time step [s] can be added; over LAST_STEP it is below rounding.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from mpm.cellmatrix import CellMatrix
 from mpm.errors import InputError
 from mpm.fem import PETSc
-from mpm.parallel import total
+from mpm.parallel import is_root, total
 from mpm.transport import stays_open
 
 if TYPE_CHECKING:
+    from mpm.fluxes import PortFlux
     from mpm.reactor import Reactor
 
 Floats = NDArray[np.float64]
@@ -69,9 +70,14 @@ class SteadySystem:
         self._matrix: PETSc.Mat | None = None
 
     def _number_unknowns(self) -> None:
-        """Gas unknowns cell by cell, then the coverages of moving cells; both contiguous on each rank."""
+        """Gas unknowns cell by cell, then the coverages of moving cells; both contiguous on each rank. The means next to outlets, outlet
+        by outlet, end the first rank's."""
         comm, bed, strip = self.strip.comm, self.bed, self.strip
-        local = self.b * self.own + self.free * len(self.moving)
+        outlets = self.operators[0].outlets if self.operators[0].drawn_in else {}
+        self.held = self.b * len(outlets) if is_root(comm) else 0
+        local = self.b * self.own + self.free * len(self.moving) + self.held
+        ends = local - self.held if is_root(comm) else 0
+        self.mean_number = int(total(comm, [ends])[0]) + self.b * np.arange(len(outlets))
         first = int(comm.scan(local)) - local
         self.local, self.first = local, first
         sizes = comm.allgather((first, strip.owned))
@@ -172,6 +178,7 @@ class SteadySystem:
             theta_c.ravel(),
             theta_theta[linked].ravel(),
             np.ones(free * len(self.moving)),
+            *self._mean_values(),
         ]
         if self._matrix is None:
             self._matrix = PETSc.Mat().create(self.strip.comm)
@@ -210,7 +217,28 @@ class SteadySystem:
         diagonal = (self.theta_number[:, None] + np.arange(free)).ravel()
         rows.append(diagonal)
         columns.append(diagonal)
+        for number, port in zip(self.mean_number, self._drawing(), strict=True):
+            near = self.gas_number[port.cells]
+            for k in range(b):
+                rows += [near + k, np.full(len(near), number + k)]
+                columns += [np.full(len(near), number + k), near + k]
+        held = self.mean_number[:, None] + np.arange(b)
+        rows.append(held.ravel()[: self.held])
+        columns.append(held.ravel()[: self.held])
         return np.concatenate(rows), np.concatenate(columns)
+
+    def _drawing(self) -> list[PortFlux]:
+        """The outlets whose means are unknowns: all of them when any draws gas back in."""
+        return list(self.operators[0].outlets.values()) if len(self.mean_number) else []
+
+    def _mean_values(self) -> list[Floats]:
+        """Matrix entries of: supply of a cell = into c, c = mean of C next to the outlet; in the order of `_pattern`."""
+        ports = self._drawing()
+        whole = total(self.strip.comm, [port.area.sum() for port in ports])
+        values = []
+        for port, area in zip(ports, whole, strict=True):
+            values += [-port.into, -port.area / area] * self.b
+        return [*values, np.ones(self.held)]
 
     def sweep(self, step: float) -> None:
         """Carry the solids along the bed at the present concentrations: theta_out of every cell from the one before it.

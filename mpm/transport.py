@@ -25,7 +25,7 @@ from mpm.flow import FaceFlow
 from mpm.fluxes import FluxAssembler, FluxOperator
 from mpm.kinetics import GasKinetics, Roles, SurfaceKinetics
 from mpm.parallel import largest, total
-from mpm.solvers import DirectSolver, KrylovSolver
+from mpm.solvers import KrylovSolver
 from mpm.strip import Strip
 
 if TYPE_CHECKING:
@@ -180,14 +180,6 @@ class Transport:
                 linear.key = (id(operator), 0.0)
             result[i] = linear.multiply(concentration[i])
         return result
-
-    def solve_steady(self, i: int, operator: FluxOperator, supply: Floats) -> Floats:
-        """Concentration of species `i` without storage under `supply` [mol/m/s], by a direct solver."""
-        matrix = StepMatrix(self.strip, self.gas_volume, self.names[i])
-        matrix.update(operator, np.inf)
-        matrix.y.array[:] = supply
-        DirectSolver(matrix.cells.matrix, f"steady {self.names[i]}").solve(matrix.y, matrix.x)
-        return matrix.x.array.copy()
 
     # --- one step ---
 
