@@ -18,6 +18,7 @@ from mpm.dem.relations import (
 from mpm.geometry import Grid
 from mpm.layout import Inlet, Layer
 from mpm.motion import Vibration
+from mpm.saturation import coverage_met, slowest_turnover, uptake
 from mpm.schedule import Schedule
 
 SMEARED = 0.1
@@ -103,9 +104,9 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     if found is None or bed is None or bed.material is None:
         return numbers
     species, numbers["excess_number"], numbers["dose_ratio"] = found
-    material, reaction = bed.material, case.mechanism.half_reaction(species)
-    assert reaction is not None
-    k = float(reaction.rate_constant(gas.temperature, case.mechanism.get(species).molar_mass))
+    mechanism, material = case.mechanism, bed.material
+    met = coverage_met(mechanism, species, material.initial_coverage, gas.temperature) or {}
+    k = uptake(mechanism, species, met, gas.temperature)
     diffusivity = eng.effective_diffusivity(material, gas.diffusivity[species])
     velocity = eng.rising_velocity(case, inlet.center)
     surface = material.surface_to_volume
@@ -116,8 +117,10 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     if k > 0.0:
         numbers["front_thickness"] = eng.front_thickness(surface, k, diffusivity)
         numbers["gas_lifetime"] = material.porosity / (surface * k)
-        per_site = k * numbers["concentrations"][species] * abs(reaction.nu_site[reaction.site])
-        numbers["site_lifetime"] = material.site_density / per_site
+        turnover = slowest_turnover(mechanism, species, met, gas.temperature)
+        if turnover > 0.0:
+            per_site = turnover * numbers["concentrations"][species]
+            numbers["site_lifetime"] = material.site_density / per_site
     if velocity > 0.0:
         numbers["Damkoehler_convection"] = eng.damkoehler_convection(surface, k, bed.height, velocity)
     return numbers

@@ -91,14 +91,14 @@ class SurfaceReaction(_Reaction):
         return np.asarray(self.sticking * np.sqrt(GAS_CONSTANT * T / (2.0 * np.pi * molar_mass)))
 
     @property
-    def product_site(self) -> str:
-        """The state that the sites change to."""
-        return max(self.nu_site, key=lambda name: self.nu_site[name])
+    def product_sites(self) -> tuple[str, ...]:
+        """The states that the sites change to."""
+        return tuple(name for name, nu in self.nu_site.items() if nu > 0.0)
 
     @property
     def molecules_per_site(self) -> float:
         """Molecules of the gas that turn over one site: 1 in (5-17), 1.5 in (5-18)."""
-        return self.nu_gas[self.gas] / self.nu_site[self.site]
+        return self.nu_gas.get(self.gas, 0.0) / self.nu_site[self.site]
 
 
 @dataclass(frozen=True)
@@ -132,9 +132,23 @@ class Mechanism:
     def site_names(self) -> tuple[str, ...]:
         return tuple(site.name for site in self.sites)
 
-    def half_reaction(self, species: str) -> SurfaceReaction | None:
-        """The surface reaction that consumes `species`, or None."""
-        return next((reaction for reaction in self.surface_reactions if reaction.gas == species), None)
+    def half_reactions(self, species: str) -> tuple[SurfaceReaction, ...]:
+        """The surface reactions that consume `species`: together they are what an ALD half-cycle does."""
+        return tuple(reaction for reaction in self.surface_reactions if reaction.gas == species)
+
+    def precursor(self, feed: Mapping[str, float]) -> str | None:
+        """The first species of a feed (mass fractions) that has a half-reaction, or None."""
+        return next((name for name, y in feed.items() if y > 0.0 and self.half_reactions(name)), None)
+
+    def titrated_sites(self, species: str) -> tuple[str, ...]:
+        """The site species that the half-reactions of `species` make and do not consume: all of its making on a saturated surface.
+
+        Where they consume every one (OH -> X -> OH) all that they make.
+        """
+        reactions = self.half_reactions(species)
+        made = dict.fromkeys(name for reaction in reactions for name in reaction.product_sites)
+        used = {reaction.site for reaction in reactions}
+        return tuple(name for name in made if name not in used) or tuple(made)
 
     def get(self, name: str) -> Species:
         """The species called `name` (KeyError otherwise)."""

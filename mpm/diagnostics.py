@@ -188,10 +188,14 @@ def film_made(case: Case, totals: Totals) -> dict[str, float]:
 
 
 def dosed_species(case: Case, inlet: Inlet) -> str | None:
-    """The species an inlet doses that has a half-reaction, or None."""
-    return next(
-        (n for n, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reaction(n)), None
-    )
+    """The precursor an inlet doses: its first species that reacts on surfaces, or None."""
+    return case.mechanism.precursor(inlet.mass_fractions)
+
+
+def titrated(case: Case, species: str, theta: Floats) -> Floats:
+    """Share of the sites that the half-reactions of `species` have made, from coverages (sites, ...): `Mechanism.titrated_sites` summed."""
+    names = case.mechanism.site_names
+    return np.sum([theta[names.index(site)] for site in case.mechanism.titrated_sites(species)], axis=0)
 
 
 def zone_of(case: Case, inlet: Inlet) -> Zone | None:
@@ -199,7 +203,7 @@ def zone_of(case: Case, inlet: Inlet) -> Zone | None:
 
 
 def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
-    """Per dosing inlet: coverage of the site species that its half-reaction makes.
+    """Per dosing inlet: coverage of the site species that the half-reactions of its precursor make (`titrated`), 1 when saturated.
 
     `box_mean`: mean over the moving layer from the left end of the inlet's zone to the inlet's centreline; `exit_profile`: the zone's
     last column, bottom to top; `exit_mean`, `exit_min` of it. Without a moving layer the topmost reactive one counts.
@@ -215,10 +219,7 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
         species, zone = dosed_species(case, inlet), zone_of(case, inlet)
         if species is None or zone is None:
             continue
-        reaction = case.mechanism.half_reaction(species)
-        assert reaction is not None  # dosed_species gives only such
-        site = reaction.product_site
-        theta = state.theta[case.mechanism.site_names.index(site)][inside]
+        theta = titrated(case, species, state.theta)[inside]
         box = grid.columns_between(zone.start, inlet.center)
         last = np.flatnonzero(grid.columns_between(zone.start, zone.end))[-1]
         profile = theta[:, last]

@@ -14,6 +14,7 @@ from mpm.geometry import Grid
 from mpm.layout import Inlet
 from mpm.materials import Material
 from mpm.motion import Vibration
+from mpm.saturation import molecules_per_site
 from mpm.schedule import Schedule
 
 MEMORY_OF_A_RANK = 0.11e9
@@ -39,31 +40,30 @@ def excess_number(
     )
 
 
-def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float] | None:
+def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float | None] | None:
     """Species, excess number and dose ratio of an inlet; None without a moving bed or a surface reaction.
 
-    The dose ratio is the excess number over what saturation needs: 1 molecule per site for TMA, 1.5 for water.
+    The dose ratio is the excess number over what saturation needs (`mpm.saturation`): 1 molecule per site for TMA, 1.5 for water. None
+    where the precursor never saturates the surface.
     """
-    bed = case.geometry.moving_layer
-    if bed is None or bed.material is None or case.motion.mean_velocity == 0.0:
+    bed, species = case.geometry.moving_layer, case.mechanism.precursor(inlet.mass_fractions)
+    if bed is None or bed.material is None or species is None or case.motion.mean_velocity == 0.0:
         return None
-    sites = bed.material.surface_to_volume * bed.material.site_density
-    for species, concentration in inlet_concentrations(
-        case.mechanism, case.gas, inlet.mass_fractions
-    ).items():
-        reaction = case.mechanism.half_reaction(species)
-        if reaction is not None and concentration > 0.0 and sites > 0.0:
-            excess = excess_number(
-                inlet.velocity,
-                inlet.width,
-                concentration,
-                case.motion.mean_velocity,
-                bed.height,
-                bed.material.surface_to_volume,
-                bed.material.site_density,
-            )
-            return species, excess, excess / reaction.molecules_per_site
-    return None
+    concentration = inlet_concentrations(case.mechanism, case.gas, inlet.mass_fractions)[species]
+    material = bed.material
+    if material.surface_to_volume == 0.0:
+        return None
+    excess = excess_number(
+        inlet.velocity,
+        inlet.width,
+        concentration,
+        case.motion.mean_velocity,
+        bed.height,
+        material.surface_to_volume,
+        material.site_density,
+    )
+    need = molecules_per_site(case.mechanism, species, material.initial_coverage, case.gas.temperature)
+    return species, excess, excess / need if need else None
 
 
 def reynolds(density: float, velocity: float, length: float, viscosity: float) -> float:

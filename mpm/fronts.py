@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.chemistry import inlet_concentrations
-from mpm.diagnostics import State, Totals, conveyed_layer, dosed_species, running_gas, running_surface
+from mpm.diagnostics import (
+    State,
+    Totals,
+    conveyed_layer,
+    dosed_species,
+    running_gas,
+    running_surface,
+    titrated,
+)
 from mpm.geometry import Grid
 
 if TYPE_CHECKING:
@@ -79,7 +87,7 @@ def front(grid: Grid, profile: Floats, feed: float, center: float) -> dict[str, 
 def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
     """Per dosing inlet and layer: the fronts of its precursor's height-averaged concentration (see `front`).
 
-    In layers with reactive surface also `coverage` [m], see `coverage_front`, of the site species that its half-reaction makes.
+    In layers with reactive surface also `coverage` [m], see `coverage_front`, of the site species that its half-reactions make.
     `height`: the y [m] at which the precursor in the column of the centreline, seen from the inlet, falls to half its feed.
     """
     result: dict[str, dict[str, Any]] = {}
@@ -89,16 +97,16 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
             continue
         field = state.concentration[species]
         feed = inlet_concentrations(case.mechanism, case.gas, inlet.mass_fractions)[species]
-        reaction = case.mechanism.half_reaction(species)
-        made = state.theta[case.mechanism.site_names.index(reaction.product_site)] if reaction else None
+        made = titrated(case, species, state.theta)
         entry: dict[str, Any] = {}
         for layer in case.geometry.layers:
             numbers = front(grid, layer_mean(grid, field, layer.name), feed, inlet.center)
-            coverage = None if made is None else _layer_coverage(grid, state, made, layer.name)
-            if coverage is not None and reaction is not None:
+            coverage = _layer_coverage(grid, state, made, layer.name)
+            if coverage is not None:
                 incoming = None
                 if layer.moving and case.geometry.bed_inflow == "fresh" and layer.material is not None:
-                    incoming = layer.material.initial_coverage.get(reaction.product_site, 0.0)
+                    fresh = layer.material.initial_coverage
+                    incoming = sum(fresh.get(site, 0.0) for site in case.mechanism.titrated_sites(species))
                 at = coverage_front(grid, coverage, inlet.center, incoming)
                 if at is not None:
                     numbers["coverage"] = at

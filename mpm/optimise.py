@@ -76,6 +76,10 @@ def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
         if excess is None:
             continue
         species, _, ratio = excess
+        if ratio is None:
+            raise InputError(
+                f"optimise: found inlet {inlet.name}, whose precursor {species} never saturates the surface; accepted: reactions that end"
+            )
         fraction = inlet.mass_fractions[species] * target / ratio
         key = f"geometry.inlet.{inlet.name}"
         start = min(max(fraction, 2.0 * LEANEST), 0.5 * RICHEST)

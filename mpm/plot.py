@@ -27,7 +27,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, species_figure
-from mpm.results import Run, dosing_inlets, fed_species, load_run, made_site, made_sites
+from mpm.results import Run, dosing_inlets, fed_species, load_run, made_sites, sites_made_by
 
 Floats = NDArray[np.float64]
 
@@ -147,17 +147,17 @@ def plot_log(axes: Axes, time: Floats, values: Floats, label: str, colour: str |
     axes.semilogy(time, shown, color=colour, label=label if np.isfinite(shown).any() else f"{label} (zero)")
 
 
-def exits(run: Run) -> list[tuple[str, str, str, int]]:
-    """Zone, inlet, site species that the inlet makes, and last column of each zone that doses a moving bed."""
+def exits(run: Run) -> list[tuple[str, str, tuple[str, ...], int]]:
+    """Zone, inlet, site species that the inlet's precursor makes, and last column of each zone that doses a moving bed."""
     if not any(layer.moving for layer in run.case.geometry.layers):
         return []
-    inlets = {inlet.name: made_site(run.case, inlet) for inlet in dosing_inlets(run.case)}
+    inlets = {inlet.name: sites_made_by(run.case, inlet) for inlet in dosing_inlets(run.case)}
     found = []
     for number, zone in enumerate(run.case.geometry.zones, start=1):
-        site = inlets.get(zone.inlet) if zone.inlet else None
+        sites = inlets.get(zone.inlet, ()) if zone.inlet else ()
         columns = np.flatnonzero(run.grid.zone_of_column == number)
-        if zone.inlet and site and len(columns):
-            found.append((zone.name, zone.inlet, site, int(columns[-1])))
+        if zone.inlet and sites and len(columns):
+            found.append((zone.name, zone.inlet, sites, int(columns[-1])))
     return found
 
 
@@ -174,12 +174,12 @@ def exit_profile_figure(run: Run, count: int = 5) -> Figure:
     shades = mpl.colormaps["cividis_r"](np.linspace(0.15, 1.0, len(steps)))
     for step, colour in zip(steps, shades, strict=True):
         snapshot = run.snapshot(int(step))
-        for panel, (_, _, site, column) in zip(axes.flat, shown, strict=False):
-            theta = run.field(snapshot, f"theta_{site}")[rows, column]
+        for panel, (_, _, sites, column) in zip(axes.flat, shown, strict=False):
+            theta = np.sum([run.field(snapshot, f"theta_{site}")[rows, column] for site in sites], axis=0)
             panel.plot(theta, y, "o-", markersize=3, color=colour, label=f"{snapshot.time:.4g} s")
-    for panel, (zone, inlet, site, _) in zip(axes.flat, shown, strict=False):
+    for panel, (zone, inlet, sites, _) in zip(axes.flat, shown, strict=False):
         panel.set_title(f"exit of zone {zone} (inlet {inlet})", fontsize=9)
-        panel.set_xlabel(f"coverage of {formula(site)}")
+        panel.set_xlabel(f"coverage of {', '.join(formula(site) for site in sites)}")
         panel.set_xlim(-0.03, 1.03)
         panel.grid(alpha=0.25)
     for panel in axes.flat[len(shown) :]:

@@ -74,15 +74,13 @@ def fed_species(case: Case) -> list[str]:
     return [name for name in case.mechanism.species_names if name in fed]
 
 
-def made_site(case: Case, inlet: Inlet) -> str | None:
-    """Site species that this inlet's half-reaction makes; None when nothing it feeds reacts on the surface."""
-    for reaction in case.mechanism.surface_reactions:
-        if inlet.mass_fractions.get(reaction.gas, 0.0) > 0.0:
-            return next((site for site, nu in reaction.nu_site.items() if nu > 0), None)
-    return None
+def sites_made_by(case: Case, inlet: Inlet) -> tuple[str, ...]:
+    """Site species whose coverage this inlet's titration counts; empty when nothing it feeds reacts on the surface."""
+    species = case.mechanism.precursor(inlet.mass_fractions)
+    return () if species is None else case.mechanism.titrated_sites(species)
 
 
 def made_sites(case: Case) -> list[str]:
     """Site species worth a map: of two that add up to one, the one the first dosing inlet makes."""
-    made = list(dict.fromkeys(site for inlet in dosing_inlets(case) if (site := made_site(case, inlet))))
+    made = list(dict.fromkeys(site for inlet in dosing_inlets(case) for site in sites_made_by(case, inlet)))
     return made[:1] if len(case.mechanism.site_names) == 2 else made

@@ -53,7 +53,7 @@ def summarise(reactor: Reactor, status: str, wall: float) -> dict[str, Any]:
             name: {"balance_error": error} for name, error in element_balances(case, totals).items()
         },
         "excess_number": {name: e[1] for name, e in excess.items()},
-        "dose_ratio": {name: e[2] for name, e in excess.items()},
+        "dose_ratio": {name: e[2] for name, e in excess.items() if e[2] is not None},
         "titration": titration(case, grid, state),
         "utilisation": utilisation(case, grid, totals),
         "outlets": nested(reactor.numbers, "outlets"),

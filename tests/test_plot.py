@@ -18,7 +18,7 @@ from mpm.geometry import Grid
 from mpm.maps import WIDTH, coverage_figure, cvd_figure, formula, species_figure, spread
 from mpm.output import RunDirectory
 from mpm.plot import exit_profile_figure, figures, history_figure, outlets_figure, plot_run
-from mpm.results import Run, dosing_inlets, fed_species, load_run, made_site
+from mpm.results import Run, dosing_inlets, fed_species, load_run, sites_made_by
 
 SITE = "OAl(CH3)2"
 TIMES = np.linspace(0.0, 2.0, 9)
@@ -194,7 +194,7 @@ def test_exit_profile_is_the_last_column_of_the_zone(cycle: Run) -> None:
     rows = grid.layer_rows("bed")
     y = 0.5 * (grid.y[1:] + grid.y[:-1])[rows] * 1e3
     inlets = dosing_inlets(cycle.case)
-    assert [made_site(cycle.case, inlet) for inlet in inlets] == [SITE, "OH"]
+    assert [sites_made_by(cycle.case, inlet) for inlet in inlets] == [(SITE,), ("OH",)]
     for panel, column in ((0, grid.columns // 2 - 1), (1, grid.columns - 1)):
         last = figure.axes[panel].get_lines()[-1]
         expected = theta(grid, 2.0)[rows, column]

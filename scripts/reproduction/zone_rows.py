@@ -12,7 +12,7 @@ from mpm.case import Case
 from mpm.chemistry import inlet_concentrations
 from mpm.engineering import inlet_excess
 from mpm.fronts import coverage_front, layer_mean
-from mpm.results import Run, made_site
+from mpm.results import Run, sites_made_by
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab
 
@@ -51,11 +51,11 @@ def increasing(values: list[float], margin: float = 0.0) -> bool:
 def bed_front(run: Run, inlet: str, index: int = -1) -> float | None:
     """Where the coverage that an inlet makes passes 1/2 in the bed at a stored time (`mpm.fronts.coverage_front`)."""
     port = next(i for i in run.case.geometry.inlets if i.name == inlet)
-    site = made_site(run.case, port)
+    (site,) = sites_made_by(run.case, port)
     profile = layer_mean(run.grid, run.field(run.snapshot(index), f"theta_{site}"), "bed")
     bed = run.case.geometry.moving_layer
     assert bed is not None and bed.material is not None
-    return coverage_front(run.grid, profile, port.center, bed.material.initial_coverage.get(str(site), 0.0))
+    return coverage_front(run.grid, profile, port.center, bed.material.initial_coverage.get(site, 0.0))
 
 
 @row(
