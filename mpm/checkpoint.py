@@ -1,16 +1,21 @@
 """Restart states: everything a run needs to go on, independent of the number of ranks.
 
 Arrays are stored in the grid's order. The velocity fields are stored too: a resumed run must not depend on how the flow solver rounds.
+A state knows its case by content, so that no other case, mesh or motion can go on from it.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import tomllib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.caseio import read_toml
 from mpm.diagnostics import Totals
 from mpm.errors import InputError
 from mpm.output import RunDirectory
@@ -22,6 +27,31 @@ if TYPE_CHECKING:
     from mpm.reactor import Reactor
 
 Arrays = dict[str, NDArray[Any]]
+State = tuple[Arrays, dict[str, Any]]
+FORMAT = 2  # of the states that this version writes and reads; another number for every change of what an entry means
+
+
+def identity(case: Case) -> dict[str, Any]:
+    """By what a state knows its case: digests of all that determines the results but for the time at which they end and are looked at.
+
+    The mesh follows from the case; files count with their content (a mechanism's tables and a shared geometry are in the case).
+    """
+    content = case.to_dict()
+    motion = content["motion"]
+    motion["profile"] = profile = _profile(motion["profile"])
+    for table, key in (("time", "end"), ("chemistry", "mechanism"), ("chemistry", "name")):
+        content[table].pop(key, None)
+    for name in ("title", "output"):
+        content.pop(name, None)
+    return {"format": FORMAT, "profile": profile, "case": _digest(json.dumps(content, sort_keys=True))}
+
+
+def _profile(name: str) -> str:
+    return name if name in ("thesis", "phases") else _digest(Path(name).read_text(encoding="utf-8"))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def write(reactor: Reactor, directory: RunDirectory) -> None:
@@ -56,13 +86,13 @@ def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
     if reactor.before is not None:
         arrays |= {f"before_{name}": np.asarray(getattr(reactor.before, name)) for name in BEFORE}
     meta = {
+        **reactor.identity,
         "time": reactor.time,
         "steps": reactor.steps,
         "rows": len(reactor.rows),
         "wall": reactor.wall,
         "distance": bed.distance,
         "shifted": bed.shifted,
-        "species": list(transport.names),
         "marched": flows.done if isinstance(flows, March) else -1,
     }
     return arrays, meta
@@ -81,10 +111,6 @@ BEFORE = (
 def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
     """Put `reactor`, freshly built for the same case, into the stored state; collective."""
     transport, bed, strip = reactor.transport, reactor.bed, reactor.strip
-    if tuple(meta["species"]) != transport.names:
-        raise InputError(
-            f"the restart state follows {', '.join(meta['species'])}; the case {', '.join(transport.names)}"
-        )
     ledger = transport.ledger
     transport.concentration = strip.scatter.to_local(arrays["concentration"])
     ledger.gas_events = strip.scatter.to_local(arrays["gas_events"])
@@ -113,21 +139,37 @@ def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
         reactor.before = Totals(**{**vars(now), **then, "slid": float(then["slid"])})
 
 
-def check_same_case(directory: RunDirectory, case: Case) -> None:
-    """Raise InputError unless the directory's case differs from `case` in nothing but an earlier end."""
-    path = directory.path / "case.toml"
-    if not path.exists():
-        return
-    old, new = tomllib.loads(path.read_text(encoding="utf-8")), tomllib.loads(case.to_toml())
-    changed = [key for key in _differences(old, new) if key != "time.end"]
+def check_same_case(directory: RunDirectory, case: Case, state: State | None) -> None:
+    """Raise InputError unless the directory's case and its `state` differ from `case` in nothing but an earlier end."""
+    mine, meta = identity(case), state[1] if state is not None else {}
+    path, where = directory.path / "case.toml", directory.path / "checkpoint.npz"
+    if state is not None and meta.get("format") != FORMAT:
+        raise InputError(
+            f"{where}: written by another version of mpm (format {meta.get('format', 1)}; this one goes on from {FORMAT}); "
+            "accepted: a run begun anew (--overwrite)"
+        )
+    same_profile = meta.get("profile") == mine["profile"]
+    old = read_toml(path) if path.exists() else {}
+    allowed = {"time.end", "motion.profile"} if same_profile else {"time.end"}
+    changed = (
+        [key for key in _differences(old, tomllib.loads(case.to_toml())) if key not in allowed] if old else []
+    )
     if changed:
         raise InputError(
             f"{directory.path}: the case has changed in {changed[0]} since this run began; accepted with --resume: a later time.end"
         )
-    state = directory.read_checkpoint()
-    if state is not None and case.time.end < state[1]["time"]:
+    if state is None:
+        return
+    if not same_profile:
         raise InputError(
-            f"{directory.path}: time.end: found {case.time.end:g} s; accepted: not before the restart state at {state[1]['time']:g} s"
+            f"{case.motion.profile}: the motion profile has changed since the run in {directory.path} began; accepted with "
+            "--resume: a later time.end"
+        )
+    if meta["case"] != mine["case"]:
+        raise InputError(f"{where}: the state of another case; accepted: that of the case to be resumed")
+    if case.time.end < meta["time"]:
+        raise InputError(
+            f"{directory.path}: time.end: found {case.time.end:g} s; accepted: not before the restart state at {meta['time']:g} s"
         )
 
 

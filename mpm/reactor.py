@@ -64,6 +64,7 @@ class Reactor:
 
     def __init__(self, case: Case, comm: MPI.Comm = MPI.COMM_WORLD):
         self.case, self.comm = case, comm
+        self.identity = checkpoint.identity(case)  # now: the profile's file may change while the run goes on
         self.grid = Grid.from_case(case)
         self.schedule = Schedule.from_case(case)
         self.strip = Strip(case, comm)
@@ -143,7 +144,7 @@ class Reactor:
             directory.prepare(resume=resume, overwrite=overwrite)
             state = directory.read_checkpoint() if resume else None
             if resume:
-                checkpoint.check_same_case(directory, self.case)
+                checkpoint.check_same_case(directory, self.case, state)
             directory.write_case(self.case.to_toml())
             return state
 

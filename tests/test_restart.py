@@ -164,6 +164,57 @@ def test_resume_refuses_another_case(tmp_path: Path) -> None:
             Reactor(case.with_({key: value}), MPI.COMM_SELF).run(output=tmp_path / "run", resume=True)
 
 
+def test_a_state_knows_its_case(tmp_path: Path) -> None:
+    """Fails when a state goes on under another case that it has been put beside: mesh, coarser or finer, or motion; or one of another
+    format."""
+    case = MODES["averaged"]
+    run(case, output=tmp_path / "run")
+    longer = case.with_({"time.end": "1 s", "title": "renamed", "output.every": "0.2 s"})
+    others = {
+        "geometry.cell_width": ["4 mm", "10 mm"],
+        "motion.bed_velocity": ["2.6 cm/s"],
+        "time.step": ["5 ms"],
+    }
+    foreign = tmp_path / "foreign"
+    for key, values in others.items():
+        for value in values:
+            foreign.mkdir()
+            shutil.copy(tmp_path / "run" / "checkpoint.npz", foreign)
+            with pytest.raises(InputError, match=r"checkpoint\.npz: the state of another case"):
+                Reactor(longer.with_({key: value}), MPI.COMM_SELF).run(output=foreign, resume=True)
+            assert [path.name for path in foreign.iterdir()] == ["checkpoint.npz"]
+            shutil.rmtree(foreign)
+    foreign.mkdir()
+    shutil.copy(tmp_path / "run" / "checkpoint.npz", foreign)
+    _, resumed = run(longer, output=foreign, resume=True)
+    assert resumed.summary["simulated_seconds"] == 1.0
+    directory = RunDirectory(tmp_path / "run")
+    state = directory.read_checkpoint()
+    assert state is not None
+    directory.write_checkpoint(state[0], {**state[1], "format": 1})
+    with pytest.raises(InputError, match="another version of mpm"):
+        Reactor(case, MPI.COMM_SELF).run(output=tmp_path / "run", resume=True)
+
+
+def test_a_state_knows_its_profile(tmp_path: Path) -> None:
+    """Fails when a motion profile that was replaced under its name is mixed with the one that the run began with, or when the same profile
+    under another name is refused."""
+    profile = tmp_path / "profile.csv"
+    shape = "".join(f"{i * 10},{0.013 + 0.01 * np.sin(np.deg2rad(i * 10)):.6g}\n" for i in range(36))
+    profile.write_text(f"phase_deg,u_x_m/s\n{shape}")
+    case = MODES["averaged"].with_({"motion.profile": str(profile)})
+    run(case.with_({"time.end": "0.2 s"}), output=tmp_path / "run")
+    again = tmp_path / "again.csv"
+    shutil.copy(profile, again)
+    run(
+        case.with_({"time.end": "0.25 s", "motion.profile": str(again)}), output=tmp_path / "run", resume=True
+    )
+    again.write_text(again.read_text().replace("0.013\n", "0.014\n", 1))
+    changed = case.with_({"motion.profile": str(again)})
+    with pytest.raises(InputError, match=r"again\.csv: the motion profile has changed"):
+        Reactor(changed, MPI.COMM_SELF).run(output=tmp_path / "run", resume=True)
+
+
 def test_resume_of_a_directory_without_a_state_starts_anew(tmp_path: Path) -> None:
     """Fails when a run that was killed before its first restart state cannot be resumed."""
     case = MODES["averaged"]
