@@ -30,6 +30,7 @@ from pydantic import (
 from mpm.caseio import assemble, built_in_files, find_file, read_toml, write_toml
 from mpm.chemistry import Mechanism
 from mpm.constants import GRAVITY
+from mpm.files import read_text
 from mpm.gases import CARRIERS, ideal_gas_density
 from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
@@ -336,7 +337,7 @@ class Case(Frozen):
         """Hexadecimal digest of everything that determines the results; a motion profile counts with its content."""
         content = self.to_dict()
         if self.motion.profile not in ("thesis", "phases"):
-            content["motion"]["profile"] = Path(self.motion.profile).read_text()
+            content["motion"]["profile"] = read_text(self.motion.profile)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def __eq__(self, other: object) -> bool:

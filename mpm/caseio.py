@@ -16,6 +16,7 @@ from typing import Any, TypeGuard
 import tomli_w
 
 from mpm.errors import InputError
+from mpm.files import read_text
 from mpm.materials import BUILT_IN
 
 Table = dict[str, Any]
@@ -35,15 +36,31 @@ _REPLACES = {
 
 def read_toml(path: Path) -> Table:
     """Parse a TOML file; InputError when it is missing, unreadable or no TOML."""
+    return parse_toml(read_source(path), path)
+
+
+def read_source(path: Path) -> str:
+    """The text of an input file; InputError when it is missing or unreadable."""
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        return read_text(path)
     except FileNotFoundError:
         raise InputError.at(path, "", "no such file", "the path of a TOML file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError.at(path, "", f"an unreadable file ({error})", "a TOML file") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError.at(path, "", f"an unreadable file ({reason})", "a TOML file") from None
+
+
+def parse_toml(text: str, source: str | Path) -> Table:
+    """Parse the text of a TOML file; InputError for what is none."""
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError.at(path, "", f"a TOML syntax error ({error})", "valid TOML") from None
+        raise InputError.at(source, "", f"a TOML syntax error ({error})", "valid TOML") from None
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # an integer of 5,000 digits, a list in a list in a list ...
+        raise InputError.at(source, "", f"more than can be read ({error})", "valid TOML") from None
 
 
 def built_in_files(folder: str) -> dict[str, Path]:

@@ -20,9 +20,10 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from mpm.errors import InputError, Interrupted, MpmError
+from mpm.errors import InputError, Interrupted, MpmError, printable
+from mpm.launcher import rank
+from mpm.screen import screen, spell_out
 
-_RANK_VARIABLES = ("PMI_RANK", "PMIX_RANK", "OMPI_COMM_WORLD_RANK", "SLURM_PROCID")
 _PATIENCE = 30.0
 """Seconds that a failing rank waits for the others to fail as well before it ends the whole job."""
 
@@ -42,14 +43,6 @@ SetOption = Annotated[
         "--set", metavar="KEY=VALUE", help="override a key, e.g. geometry.inlet.tma.velocity='4 cm/s'"
     ),
 ]
-
-
-def rank() -> int:
-    """This process's rank: from MPI once it is loaded, else from what the launcher says."""
-    mpi = sys.modules.get("mpi4py.MPI")
-    if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized():
-        return int(mpi.COMM_WORLD.rank)
-    return next((int(os.environ[name]) for name in _RANK_VARIABLES if name in os.environ), 0)
 
 
 def parse_settings(settings: Sequence[str] | None) -> dict[str, Any]:
@@ -77,8 +70,9 @@ def _options(
     if version:
         from mpm.versions import versions
 
+        found = versions()  # on every rank: it starts MPI, which waits for all of them
         if rank() == 0:
-            for name, number in versions().items():
+            for name, number in found.items():
                 print(f"{name:<11}{number}")
     elif context.invoked_subcommand is None and rank() == 0:
         print(context.get_help())
@@ -107,11 +101,9 @@ def run(
 
     result = Reactor(loaded).run(output=directory, resume=resume, overwrite=overwrite, progress=not quiet)
     if rank() == 0 and not quiet:
-        from rich.console import Console
-
         from mpm.tables import print_summary
 
-        print_summary(result.summary, Console())
+        print_summary(result.summary, screen())
         print(f"Results: {directory}")
 
 
@@ -129,14 +121,12 @@ def mesh(
     loaded = load_case(case, parse_settings(settings))
     if rank() != 0:
         return
-    from rich.console import Console
-
     from mpm.mesh import write_msh
     from mpm.tables import print_mesh
 
     path = output or Path(f"{Path(case).stem}.msh")
     write_msh(loaded, path)
-    print_mesh(loaded, Console())
+    print_mesh(loaded, screen())
     print(f"Mesh: {path}")
 
 
@@ -161,11 +151,9 @@ def check(
 
         print(json.dumps({**report, "case": loaded.to_dict()}, indent=2, allow_nan=False))
         return
-    from rich.console import Console
-
     from mpm.tables import print_report
 
-    print_report(loaded, report, Console())
+    print_report(loaded, report, screen())
 
 
 @app.command()
@@ -263,6 +251,7 @@ def dem(context: typer.Context) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; no MpmError leaves a traceback."""
+    spell_out()
     with _terminable():
         try:
             result = typer.main.get_command(app).main(
@@ -306,7 +295,7 @@ def _terminable() -> Iterator[None]:
 def _end(status: int, line: str) -> int:
     """Say `line` once, wait for the other ranks to fail too, and return the status."""
     if rank() == 0:
-        print(" ".join(line.split()), file=sys.stderr, flush=True)
+        print(printable(line), file=sys.stderr, flush=True)
     mpi = sys.modules.get("mpi4py.MPI")
     if mpi is None or not mpi.Is_initialized() or mpi.Is_finalized() or mpi.COMM_WORLD.size == 1:
         return status

@@ -43,7 +43,7 @@ class InputError(MpmError):
         line = ": ".join([*parts, f"found {found}; accepted: {accepted}"]) + suggestion(
             given or key.rpartition(".")[2], known
         )
-        return cls(" ".join(line.split()))
+        return cls(printable(line))
 
 
 class ConvergenceError(MpmError):
@@ -60,6 +60,14 @@ class Interrupted(MpmError):
     """The run was asked to stop (Ctrl-C, SIGTERM); what was written is usable and `--resume` continues it."""
 
     exit_status = 130
+
+
+def printable(text: str) -> str:
+    """`text` on one line: blanks in place of line ends, control characters (which could steer a terminal) spelled out."""
+    line = " ".join(text.split())
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in line
+    )
 
 
 def nearest(given: str, known: Iterable[str]) -> str | None:

@@ -1,7 +1,34 @@
-"""Writing files so that a reader, or a run killed at any moment, never meets half a file."""
+"""Reading text in whatever way an editor saved it; writing files so that nobody, killed run or reader, meets half a file."""
 
+import codecs
 import os
 from pathlib import Path
+
+_OTHER_MARKS = {
+    codecs.BOM_UTF32_LE: "UTF-32",  # begins like UTF-16, so it comes first
+    codecs.BOM_UTF32_BE: "UTF-32",
+    codecs.BOM_UTF16_LE: "UTF-16",
+    codecs.BOM_UTF16_BE: "UTF-16",
+}
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a UTF-8 file, whatever the locale, without the byte order mark that Windows editors put first.
+
+    Raises OSError, and ValueError whose text says how the file is encoded instead, or that its name cannot be one.
+    """
+    content = Path(path).read_bytes()
+    for mark, encoding in _OTHER_MARKS.items():
+        if content.startswith(mark):
+            raise ValueError(f"{encoding} text, save it as UTF-8")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ValueError(
+            f"byte 0x{content[error.start]:02X} in line {line} is not UTF-8, save it as UTF-8"
+        ) from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def write_atomically(path: str | os.PathLike[str], content: bytes | str, *, sync: bool = False) -> None:

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from mpm.files import read_text
 from mpm.units import Angle, Frequency, NonNegative, reject
 
 REQUIRED = ("phase_deg", "u_x_m/s")
@@ -73,7 +74,7 @@ def read_profile(path: Path, key: str = "profile") -> BedProfile:
         return reject(f"{path}: {found}", accepted, key=key, **context)
 
     try:
-        text = path.read_text(encoding="utf-8-sig")  # a byte-order mark is no part of the first name
+        text = read_text(path)
     except FileNotFoundError:
         raise wrong(
             "no such file",
@@ -81,7 +82,7 @@ def read_profile(path: Path, key: str = "profile") -> BedProfile:
             given=path.name,
             known=["thesis", "phases"],
         ) from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise wrong(f"unreadable ({error})", "a CSV file from mpm dem") from None
     lines = [line for line in text.splitlines() if line.strip()]
     rows = list(csv.reader(line for line in lines if line[0] != "#"))

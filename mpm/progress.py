@@ -13,10 +13,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from rich.console import Console
 from rich.status import Status
+from rich.text import Text
 
 from mpm.parallel import is_root
+from mpm.screen import screen, spinner
 
 if TYPE_CHECKING:
     from mpm.reactor import Reactor
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 @contextmanager
 def log_file(log: logging.Logger, path: Path | None) -> Iterator[None]:
     """Add the messages of `log` to the file `path`; without one they go nowhere."""
-    handler = logging.FileHandler(path) if path is not None else logging.NullHandler()
+    handler = logging.FileHandler(path, encoding="utf-8") if path is not None else logging.NullHandler()
     handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
     log.setLevel(logging.INFO)
     log.addHandler(handler)
@@ -42,7 +43,7 @@ class Progress:
     def __init__(self, reactor: Reactor, shown: bool):
         self.reactor = reactor
         self.shown = shown and is_root(reactor.comm)
-        self.console = Console(stderr=True)
+        self.console = screen(stderr=True)
         self.interval = 0.2 if self.console.is_terminal else 10.0
         self.status: Status | None = None
         self.first: tuple[float, int] | None = None
@@ -50,7 +51,7 @@ class Progress:
 
     def __enter__(self) -> Self:
         if self.shown and self.console.is_terminal:
-            self.status = self.console.status("starting")
+            self.status = self.console.status("starting", spinner=spinner(self.console))
             self.status.start()
         return self
 
@@ -67,10 +68,10 @@ class Progress:
         if not self.shown:
             return
         if self.status is not None:
-            self.status.update(text)
+            self.status.update(Text(text))
         elif clock.monotonic() - self.printed > self.interval or text == "flow":
             self.printed = clock.monotonic()
-            self.console.print(text, highlight=False)
+            self.console.print(text)
 
     def advance(self) -> None:
         """A step has been done."""
@@ -83,9 +84,9 @@ class Progress:
         self.printed = clock.monotonic()
         text = self.line()
         if self.status is not None:
-            self.status.update(text)
+            self.status.update(Text(text))
         if text and (self.status is None or force):
-            self.console.print(text, highlight=False)
+            self.console.print(text)
 
     def line(self) -> str:
         """One line of numbers; empty before the first step."""

@@ -8,33 +8,33 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
+from rich.text import Text
 
 from mpm.case import Case
+from mpm.errors import printable
 from mpm.geometry import Grid
+from mpm.screen import Listing
 
 
 def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
     """Print the case and its numbers as tables."""
     mesh, run = report["mesh"], report["run"]
-    console.print(f"[bold]{case.title or 'case'}[/bold]: {case.fidelity}, to {case.time.end:g} s")
+    title = Text(printable(case.title) or "case", style="bold")
+    console.print(title.append(f": {case.fidelity}, to {case.time.end:g} s", style="not bold"))
     console.print(
         f"{mesh['cells']:,} cells ({mesh['columns']} columns of {mesh['column_width'] * 1e3:.3g} mm, {mesh['rows']} rows), "
         f"{run['steps']:,} steps, about {run['peak_memory_bytes'] / 1e9:.1f} GB, CFL {run['flow_courant']:.2g}"
     )
-    console.print(
-        _layer_table(case),
-        _port_table(case, report),
-        _number_table(case, report),
-        *report["reactions"],
-        sep="\n",
-    )
+    for listing in (_layer_table(case), _port_table(case, report), _number_table(case, report)):
+        listing.print(console)
+    for reaction in report["reactions"]:
+        console.print(printable(reaction))
     for warning in report["warnings"]:
-        console.print(f"[yellow]warning:[/yellow] {warning}")
+        console.print(Text("warning:", style="yellow").append(f" {printable(warning)}", style="default"))
 
 
-def _layer_table(case: Case) -> Table:
-    table = Table(
+def _layer_table(case: Case) -> Listing:
+    table = Listing(
         "layer", "height [mm]", "rows", "material", "porosity", "k [um2]", "tau2", "S [1/m]", "sites [mol/m2]"
     )
     for layer in reversed(case.geometry.layers):
@@ -63,8 +63,8 @@ def _pair(values: Iterable[float]) -> str:
     return " / ".join(dict.fromkeys(f"{value:.3g}" for value in values))
 
 
-def _port_table(case: Case, report: dict[str, Any]) -> Table:
-    table = Table(
+def _port_table(case: Case, report: dict[str, Any]) -> Listing:
+    table = Listing(
         "port",
         "at [mm]",
         "width [mm]",
@@ -90,12 +90,12 @@ def _port_table(case: Case, report: dict[str, Any]) -> Table:
             *(f"{numbers[key]:.3g}" if key in numbers else "" for key in ("excess_number", "dose_ratio")),
         )
     for outlet in case.geometry.outlets:
-        table.add_row(outlet.name, f"{outlet.center * 1e3:g}", f"{outlet.width * 1e3:g}", "", "outlet")
+        table.add_row(f"{outlet.name} (outlet)", f"{outlet.center * 1e3:g}", f"{outlet.width * 1e3:g}")
     return table
 
 
-def _number_table(case: Case, report: dict[str, Any]) -> Table:
-    table = Table("quantity", "value", "unit")
+def _number_table(case: Case, report: dict[str, Any]) -> Listing:
+    table = Listing("quantity", "value", "unit")
     motion, bed, gas = report["motion"], report.get("bed", {}), report["gas"]
 
     def row(name: str, value: float | None, unit: str = "", scale: float = 1.0) -> None:
@@ -131,7 +131,7 @@ def _number_table(case: Case, report: dict[str, Any]) -> Table:
 def print_mesh(case: Case, console: Console) -> None:
     """Print layers, zones and ports of the mesh with their cells and facets."""
     grid, geometry = Grid.from_case(case), case.geometry
-    regions = Table("region", "from [mm]", "to [mm]", "columns", "rows", "cells")
+    regions = Listing("region", "from [mm]", "to [mm]", "columns", "rows", "cells")
     for layer in reversed(geometry.layers):
         rows = grid.layer_rows(layer.name)
         low, high = grid.y[rows.start], grid.y[rows.stop]
@@ -153,15 +153,15 @@ def print_mesh(case: Case, console: Console) -> None:
             f"{grid.rows}",
             f"{columns * grid.rows:,}",
         )
-    ports = Table("port", "side", "from [mm]", "to [mm]", "facets")
+    ports = Listing("port", "side", "from [mm]", "to [mm]", "facets")
     for kind, port in [*(("inlet", p) for p in geometry.inlets), *(("outlet", p) for p in geometry.outlets)]:
         facets = int((grid.overlap(port) > 0.0).sum())
         ports.add_row(
             f"{kind} {port.name}", port.side, f"{port.x0 * 1e3:g}", f"{port.x1 * 1e3:g}", f"{facets}"
         )
-    console.print(
-        regions, ports, f"{grid.cells:,} cells, {grid.columns} columns of {grid.dx * 1e3:.4g} mm", sep="\n"
-    )
+    regions.print(console)
+    ports.print(console)
+    console.print(f"{grid.cells:,} cells, {grid.columns} columns of {grid.dx * 1e3:.4g} mm")
 
 
 _SUMMARY = {
@@ -176,15 +176,15 @@ _SUMMARY = {
 
 def print_summary(summary: dict[str, Any], console: Console) -> None:
     """Print the figures of a summary that one looks at first, and the worst balance."""
-    table = Table("quantity", "of", "value")
+    table = Listing("quantity", "of", "value")
     for section, title in _SUMMARY.items():
         for name, value in _numbers(summary.get(section, {})):
             table.add_row(title, name, f"{value:.4g}")
-    console.print(table)
+    table.print(console)
     balances = [(name, value) for name, value in _numbers(summary) if name.endswith("balance_error")]
     if balances:
         worst, error = max(balances, key=lambda entry: abs(entry[1]))
-        console.print(f"worst balance: {error:.1e} ({worst.removesuffix(' balance_error')})")
+        console.print(f"worst balance: {error:.1e} ({printable(worst.removesuffix(' balance_error'))})")
     counts = {
         key: summary.get(key) for key in ("steps", "cells", "ranks", "simulated_seconds", "wall_seconds")
     }

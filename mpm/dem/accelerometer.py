@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from mpm.errors import InputError
+from mpm.files import read_text
 
 from ..constants import GRAVITY
 from .waveform import Harmonic, HarmonicWaveform
@@ -43,11 +44,11 @@ def read_record(path: Path, unit: str = "m/s^2") -> Record:
     if scale is None:
         raise InputError(f"{path}: unit of acceleration: found {unit!r}, accepted m/s^2 or g")
     try:
-        lines = [line for line in Path(path).read_text().splitlines() if line.strip()]
+        lines = [line for line in read_text(path).splitlines() if line.strip()]
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not a text file") from None
+    except ValueError as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
     rows: list[list[float]] = []
     for number, line in enumerate(lines):
         if line.lstrip().startswith("#"):

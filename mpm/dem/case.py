@@ -6,7 +6,6 @@ diameters. Reading needs no LAMMPS.
 
 import hashlib
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from mpm.caseio import read_toml
 from mpm.errors import InputError
 from mpm.units import (
     Angle,
@@ -324,12 +324,7 @@ def load_case(source: Path | str | Mapping[str, Any], overrides: Mapping[str, An
     else:
         path = Path(source)
         name, directory = str(path), path.parent
-        try:
-            data = tomllib.loads(path.read_text())
-        except OSError as error:
-            raise InputError(f"{name}: cannot be read ({error.strerror})") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"{name}: not a TOML file ({error})") from None
+        data = read_toml(path)
     if "directory" in data:
         raise InputError(f"{name}: directory: unknown key")
     for key, value in (overrides or {}).items():

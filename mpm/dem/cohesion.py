@@ -87,4 +87,4 @@ def table_text(
 
 def write_table(path: Path, *sections: str) -> None:
     """Write the sections of `table_text` into one file."""
-    path.write_text("\n".join(sections))
+    path.write_text("\n".join(sections), encoding="utf-8")

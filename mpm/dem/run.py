@@ -4,7 +4,6 @@ import multiprocessing
 import queue
 import shutil
 import signal
-import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -223,8 +222,9 @@ def progress_bar(case: DemCase, shown: bool) -> tuple[Report, Callable[[], None]
     """(report, close): a bar on standard error over the cycles of all seeds, or nothing."""
     if not shown:
         return silent, (lambda: None)
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    from mpm.screen import screen
 
     bar = Progress(
         TextColumn("{task.description}"),
@@ -232,7 +232,7 @@ def progress_bar(case: DemCase, shown: bool) -> tuple[Report, Callable[[], None]
         TextColumn("{task.completed:.1f}/{task.total:.0f} cycles"),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        console=Console(file=sys.stderr),
+        console=screen(stderr=True),
     )
     tasks = {seed: bar.add_task(f"seed {seed}", total=case.run.cycles) for seed in case.run.seeds}
     bar.start()

@@ -6,6 +6,8 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+from mpm.errors import printable
+
 WORDS = {
     "done": "done",
     "failed": "failed",
@@ -41,15 +43,20 @@ class Board:
 
     def __enter__(self) -> "Board":
         if self.live:
-            from rich.console import Console
             from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-            columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"))
+            from mpm.screen import screen
+
+            columns = (
+                TextColumn("{task.description}", markup=False),
+                BarColumn(),
+                TextColumn("{task.fields[state]}"),
+            )
             self._display = Progress(
-                *columns, TimeElapsedColumn(), console=Console(stderr=True), refresh_per_second=2
+                *columns, TimeElapsedColumn(), console=screen(stderr=True), refresh_per_second=2
             )
             self._display.start()
-            self._task = self._display.add_task(self.title, total=self.total, state="")
+            self._task = self._display.add_task(printable(self.title), total=self.total, state="")
             self.refresh()
         return self
 
@@ -70,7 +77,7 @@ class Board:
             took = f" in {seconds:.1f} s" if seconds > 0 else ""
             note = f": {error}" if error else ""
             print(
-                f"[{finished}/{self.total}] {name} {status}{took}{note}; {self.state()}",
+                f"[{finished}/{self.total}] {name} {status}{took}{printable(note)}; {self.state()}",
                 file=sys.stderr,
                 flush=True,
             )
@@ -96,7 +103,7 @@ class Board:
 
 def say(text: str) -> None:
     """A sentence to the person at the terminal; results never go to standard error."""
-    print(f"mpm sweep: {text}", file=sys.stderr, flush=True)
+    print(f"mpm sweep: {printable(text)}", file=sys.stderr, flush=True)
 
 
 def now() -> str:

@@ -139,7 +139,7 @@ def killed_rank(log: str, status: int) -> int:
 
 def write_record(path: str, record: dict[str, Any]) -> None:
     """Replace the point's verdict in one step (`mpm.files` is out of reach here: no package is imported)."""
-    with open(path + ".tmp", "w") as stream:
+    with open(path + ".tmp", "w", encoding="utf-8") as stream:
         json.dump(record, stream, indent=1)
         stream.flush()
         os.fsync(stream.fileno())

@@ -47,7 +47,7 @@ class Layout:
 def read_json(path: Path) -> dict[str, Any]:
     """The object in a JSON file; empty when there is none, or only half of one."""
     try:
-        content = json.loads(path.read_text())
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}

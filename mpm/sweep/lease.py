@@ -67,7 +67,7 @@ class Watch:
     def ended(self) -> bool:
         """Look once; whether the driver said stop, fell silent, or has a successor. To be called every `POLL` seconds."""
         try:
-            content = self.path.read_text()
+            content = self.path.read_text(encoding="utf-8")
         except OSError:
             content = self._last  # being replaced, or a network file system catching its breath
         self._same = 0 if content != self._last else self._same + 1

@@ -19,13 +19,13 @@
 Everything wrong with the file is an InputError of one line: file, key, what was found, what is accepted.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mpm.case import Case, load_case
+from mpm.caseio import parse_toml, read_source
 from mpm.errors import InputError
 from mpm.sweep.conditions import Condition
 from mpm.sweep.quantities import Range, to_number, unit_as_written
@@ -204,14 +204,8 @@ def _base(path: Path, name: str, fixed: Mapping[str, Any]) -> Case:
 def read_sweep(source: str | Path) -> Sweep:
     """Parse and check a sweep file and its base case; InputError for everything wrong with either."""
     path = Path(source)
-    try:
-        text = path.read_text()
-        document = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not a text file"
-        raise InputError(f"{path}: cannot be read ({reason}); accepted: a sweep file (TOML)") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not TOML: {error}") from None
+    text = read_source(path)
+    document = parse_toml(text, path)
     if "sweep" not in document:
         raise InputError.at(path, "sweep", "nothing", "a table [sweep] (is this a case? then: mpm run)")
     table = _take(path, "", document, "sweep", dict, None)

@@ -139,7 +139,7 @@ def load_sweep(directory: str | Path) -> "xr.Dataset | pd.DataFrame":
             directory, "", "no sweep", "a directory that `mpm sweep` wrote, with sweep.json and results.csv"
         )
     words = {"status", "error", "point", *(axis["name"] for axis in about["axes"] if axis["kind"] == "word")}
-    with table.open(newline="") as stream:
+    with table.open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     frame = pd.DataFrame(
         {
