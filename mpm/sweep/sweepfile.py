@@ -126,10 +126,12 @@ def _choice(path: Path, key: str, table: Mapping[str, Any], choices: Sequence[st
     return value
 
 
-def _at_least(path: Path, key: str, table: Mapping[str, Any], least: int, default: int | None) -> int:
-    value = _take(path, "sweep", table, key, int, default)
+def _at_least(
+    path: Path, key: str, table: Mapping[str, Any], least: int, default: int | None, where: str = "sweep"
+) -> int:
+    value = _take(path, where, table, key, int, default)
     if value < least:
-        raise InputError.at(path, f"sweep.{key}", repr(value), f"a whole number of at least {least}")
+        raise InputError.at(path, f"{where}.{key}", repr(value), f"a whole number of at least {least}")
     return value
 
 
@@ -178,6 +180,13 @@ def _axis(path: Path, number: int, table: Any, sampled: bool) -> Axis:
         raise InputError.at(path, f"{where}.num", repr(num), "a whole number of at least 1")
     _, si_unit = to_number(ends["start"])
     return Axis(name, tuple(keys), () if sampled else span.levels(num), span, span.unit, si_unit)
+
+
+def _slurm(path: Path, table: Mapping[str, Any]) -> Mapping[str, Any]:
+    """[sweep.slurm] as it is, with the two numbers that are ours checked; dask_jobqueue looks at its own."""
+    for key in ("workers", "points_per_job"):
+        _at_least(path, key, table, 1, 1, where="sweep.slurm")
+    return table
 
 
 def _fixed(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -254,5 +263,5 @@ def read_sweep(source: str | Path) -> Sweep:
         method=_choice(path, "method", table, METHODS),
         seed=_at_least(path, "seed", table, 0, 0),
         ranks=_at_least(path, "ranks", table, 1, 1),
-        slurm=_take(path, "sweep", table, "slurm", dict, {}),
+        slurm=_slurm(path, _take(path, "sweep", table, "slurm", dict, {})),
     )

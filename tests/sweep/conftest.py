@@ -62,15 +62,16 @@ note("stop")
 """
 DRIVER = """
 import sys
-from mpm.errors import InputError
-from mpm.sweep import run_sweep
+from mpm.errors import MpmError
+from mpm.sweep import cluster, run_sweep
 
+cluster.QUEUE_SECONDS = 1.0
 path, output, jobs, ranks, scheduler, *command = sys.argv[1:]
 try:
     sys.exit(run_sweep(path, output, int(jobs), int(ranks), scheduler or None, command=command))
-except InputError as error:
+except MpmError as error:
     print(f"error: {error}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(error.exit_status)
 """
 
 

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -10,7 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from mpm.sweep.cluster import slurm_options
+from mpm.errors import InputError
+from mpm.sweep import cluster
+from mpm.sweep.cluster import PoolLost, Waiting, look_at_queue, slurm_options
 from mpm.sweep.lease import Lease, Watch
 
 pytest.importorskip("distributed", reason="needs the extra sweep")
@@ -125,6 +128,15 @@ def test_an_address_without_a_scheduler_is_one_line(bench):
     assert "Traceback" not in messages
 
 
+def test_a_port_that_says_nothing_is_no_scheduler(monkeypatch):
+    """Fails when a listener that accepts and never answers, or an address of TLS without keys, holds the driver up."""
+    monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        for address in (f"tcp://127.0.0.1:{silent.getsockname()[1]}", "tls://127.0.0.1:1", "127.0.0.1", ""):
+            with pytest.raises(InputError, match="--scheduler: found"), cluster.dask_pool(address, "none"):
+                pass
+
+
 def test_a_driver_that_fell_silent_has_left(tmp_path):
     """Fails when a point on another machine would outlive its driver, or one with a living driver be stopped."""
     with Lease(tmp_path / "lease") as lease:
@@ -154,15 +166,89 @@ for job in sys.argv[1:]:
 """
 
 
-def test_slurm_runs_the_sweep_in_its_jobs(bench):
-    """sbatch and scancel are scripts that start and end processes here. Fails when job scripts do not run points."""
+def slurm(bench, **scripts: str) -> None:
+    """Puts commands of these texts first on the PATH of the bench's drivers."""
     commands, jobs = bench.path / "bin", bench.path / "jobs"
     commands.mkdir()
     jobs.mkdir()
-    for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
-        (commands / name).write_text(text.format(python=sys.executable))
+    for name, text in scripts.items():
+        (commands / name).write_text(text)
         (commands / name).chmod(0o755)
     bench.environment = {"PATH": f"{commands}:{os.environ['PATH']}", "JOBS": str(jobs)}
+
+
+@pytest.mark.parametrize(
+    ("refusing", "said"),
+    [
+        (
+            "#!/bin/sh\necho 'sbatch: error: invalid partition: short' >&2\nexit 1\n",
+            "invalid partition: short",
+        ),
+        ("#!/bin/sh\nexit 3\n", "sbatch ended with status 3 and without a word"),
+        ("#!/bin/sh\necho welcome\n", "Could not parse job id"),
+        ("#!/nowhere/sh\n", "sbatch cannot be started"),
+    ],
+)
+def test_jobs_that_slurm_refuses_end_the_sweep(bench, refusing, said):
+    """Fails when the driver waits for jobs that were never taken, shows a traceback, or ends as if all were well."""
+    slurm(bench, sbatch=refusing)
+    bench.sweep("[0.1]", tail='[sweep.slurm]\nworkers = 2\ninterface = "lo"\n')
+    status, messages = bench.run(scheduler="slurm")
+    assert status == 3, messages
+    assert "no job could be submitted" in messages.splitlines()[-1] and said in messages.splitlines()[-1]
+    assert "Traceback" not in messages and not bench.events("start")
+
+
+QUEUE = """#!{python}
+import os, sys
+for job in sys.argv[2].partition("=")[2].split(","):
+    if os.path.exists(f"/proc/{{job}}") and open(f"/proc/{{job}}/stat").read().split()[2] != "Z":
+        print(f"{{job}}|RUNNING (None)")
+"""
+
+
+def test_jobs_that_end_before_a_worker_connects_end_the_sweep(bench):
+    """The jobs find no Python. Fails when the driver waits for workers that no job will start, or does not say where to look."""
+    python = sys.executable
+    broken = SBATCH.format(python=python).replace(
+        '["bash"', '["bash", "-c", "echo no module dask >&2", "job"'
+    )
+    slurm(bench, sbatch=broken, scancel=SCANCEL.format(python=python), squeue=QUEUE.format(python=python))
+    bench.sweep("[0.1]", tail='[sweep.slurm]\nworkers = 2\ninterface = "lo"\n')
+    status, messages = bench.run(scheduler="slurm")
+    assert status == 3, messages
+    assert "have ended" in messages and "Traceback" not in messages
+    assert Counter(bench.table().status) == {"pending": 1}
+
+
+def test_what_a_waiting_sweep_waits_for_is_said_once(tmp_path, monkeypatch, capsys):
+    """Fails when a pending job is not named with Slurm's reason, is named at every look, or a lost queue counts as empty."""
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+
+    def answer(text: str) -> None:
+        (tmp_path / "squeue").write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / "squeue").chmod(0o755)
+
+    answer("echo '7|PENDING (QOSMaxJobsPerUserLimit)'")
+    monkeypatch.setattr(cluster, "QUEUE_SECONDS", 0.0)
+    waiting = Waiting(lambda: look_at_queue(["7"], tmp_path))
+    for _ in range(3):
+        waiting.update(0)
+    waiting.update(1)
+    assert capsys.readouterr().err.count("job 7 is PENDING (QOSMaxJobsPerUserLimit)") == 1
+    answer("echo 'slurm_load_jobs error: Unable to contact slurm controller' >&2; exit 1")
+    waiting.update(0)
+    assert "squeue does not tell" in capsys.readouterr().err
+    (tmp_path / "dask-worker-7.err").write_text("ModuleNotFoundError: No module named 'distributed'\n")
+    answer("echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1")
+    with pytest.raises(PoolLost, match=r"\(7\) have ended.*No module named 'distributed'"):
+        waiting.update(0)
+
+
+def test_slurm_runs_the_sweep_in_its_jobs(bench):
+    """sbatch and scancel are scripts that start and end processes here. Fails when job scripts do not run points."""
+    slurm(bench, sbatch=SBATCH.format(python=sys.executable), scancel=SCANCEL.format(python=sys.executable))
+    jobs = bench.path / "jobs"
     bench.sweep(
         "[0.1, 0.2, 0.3, 0.4]", tail='[sweep.slurm]\nworkers = 2\nqueue = "short"\ninterface = "lo"\n'
     )
