@@ -30,6 +30,7 @@ from pydantic import (
 from mpm.caseio import assemble, built_in_files, find_file, read_toml, write_toml
 from mpm.chemistry import Mechanism
 from mpm.constants import GRAVITY
+from mpm.diffusion import scaled_diffusivity
 from mpm.files import read_text
 from mpm.gases import CARRIERS, ideal_gas_density
 from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
@@ -81,7 +82,8 @@ SpeciesDiffusivity = Annotated[
     dict[str, Diffusivity],
     WithJsonSchema(
         {
-            "description": 'one value for all species, e.g. "2.88e-5 m^2/s", or a table of them (and of a default)',
+            "description": 'one value for all species, e.g. "2.88e-5 m^2/s", or a table of them (and of a default); of those left '
+            "out the value in N2 at 473 K and 101325 Pa, 2.88e-5 m^2/s, is scaled to the carrier, temperature and pressure",
             "anyOf": [{"type": "string"}, {"type": "object", "additionalProperties": {"type": "string"}}],
         }
     ),
@@ -92,7 +94,7 @@ class Gas(Frozen):
     """The carrier gas, whose density and viscosity are those of the mixture (precursors are dilute).
 
     molar_mass, viscosity, density: by default from the carrier's property model (`mpm.gases`) and the ideal gas law;
-    diffusivity: one value per species of the mechanism, in free gas.
+    diffusivity: one value per species of the mechanism, in free gas; those left out are scaled (`mpm.diffusion`).
     """
 
     carrier: str = "N2"
@@ -102,6 +104,25 @@ class Gas(Frozen):
     viscosity: Viscosity = worked_out()
     density: Density = worked_out()
     diffusivity: SpeciesDiffusivity = worked_out({})
+    _scaled: tuple[str, ...] = PrivateAttr(())
+
+    @property
+    def scaled(self) -> tuple[str, ...]:
+        """The species whose diffusivity the case leaves to `mpm.diffusion`."""
+        return self._scaled
+
+    def complete(self, mechanism: Mechanism) -> None:
+        """Fill in the diffusivities that are left out; the case does this once the mechanism is known."""
+        left_out = [species for species in mechanism.species if species.name not in self.diffusivity]
+        self._scaled = tuple(species.name for species in left_out)
+        default = {
+            species.name: scaled_diffusivity(
+                species, self.carrier, self.molar_mass, self.temperature, self.pressure
+            )
+            for species in left_out
+        }
+        values = {**default, **self.diffusivity}
+        self.__dict__["diffusivity"] = {name: values[name] for name in mechanism.species_names}
 
     @model_validator(mode="after")
     def _fill_in(self) -> Self:
@@ -260,6 +281,7 @@ class Case(Frozen):
             if layer.material_name is not None:
                 layer._material = self.materials[layer.material_name]
         self._check_chemistry()
+        self.gas.complete(self._mechanism)
         if self.transport.vibrational_dispersion and self.fidelity == "resolved":
             raise reject(
                 "true in a resolved run, which follows the vibration itself",

@@ -21,9 +21,6 @@ from mpm.materials import BUILT_IN
 
 Table = dict[str, Any]
 
-DEFAULT_DIFFUSIVITY = "2.88e-5 m^2/s"
-"""The thesis left mixture properties at the defaults of its solver, which has this value for all species."""
-
 _REPLACES = {
     "sticking": ("A", "b", "Ea", "reference_temperature"),
     "A": ("sticking",),
@@ -244,9 +241,10 @@ def _spread_diffusivity(data: Table) -> None:
     values = gas.get("diffusivity", {})
     if isinstance(values, (dict, str)):
         values = {"default": values} if isinstance(values, str) else dict(values)
-        default = values.pop("default", DEFAULT_DIFFUSIVITY)
-        species = _table(_table(data, "chemistry"), "species")
-        gas["diffusivity"] = {**dict.fromkeys(species, default), **values}
+        if "default" in values:
+            species = _table(_table(data, "chemistry"), "species")
+            values = {**dict.fromkeys(species, values.pop("default")), **values}
+        gas["diffusivity"] = values
 
 
 def write_toml(data: Mapping[str, Any]) -> str:

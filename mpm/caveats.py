@@ -6,6 +6,10 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mpm.diffusion import carrier_ratio, scaled_diffusivity
+from mpm.elements import formula_mass
+from mpm.gases import CARRIERS, ideal_gas_density
+
 if TYPE_CHECKING:
     from mpm.case import Case
 
@@ -13,6 +17,13 @@ SAME_GAMMA = 0.02
 """Relative difference of Gamma that passes between a profile and its use: what an accelerometer resolves."""
 SAME_ANGLE = math.radians(1.0)
 """The same for the angle of vibration [rad]."""
+
+SAME_MASS = 0.01
+"""Relative difference of a molar mass from that of the formula that is rounding or a mixture of isotopes."""
+SAME_DENSITY = 0.05
+"""Relative difference of a typed density from the ideal gas' that real gases have."""
+SAME_PROPERTY = 2.0
+"""Factor by which a typed viscosity or diffusivity may differ from the model's: correlations and measurements differ by less."""
 
 
 def profile_caveats(case: Case) -> list[str]:
@@ -59,3 +70,65 @@ def profile_caveats(case: Case) -> list[str]:
             f"{math.degrees(angle):.3g} deg: {slides}"
         )
     return found
+
+
+def gas_caveats(case: Case) -> list[str]:
+    """Typed properties of the gas that its temperature, pressure and carrier contradict, and diffusivities in a gas that is not known."""
+    gas, found = case.gas, []
+    state = f"{gas.carrier} at {gas.temperature:g} K and {gas.pressure:.6g} Pa"
+    ideal = ideal_gas_density(gas.pressure, gas.molar_mass, gas.temperature)
+    if abs(gas.density - ideal) > SAME_DENSITY * ideal:
+        found.append(
+            f"gas.density is {gas.density:.4g} kg/m3, {state} has {ideal:.4g} kg/m3: feeds are counted with the latter"
+        )
+    model = CARRIERS.get(gas.carrier)
+    if model is not None and _apart(gas.viscosity, model.viscosity(gas.temperature)):
+        found.append(
+            f"gas.viscosity is {gas.viscosity:.3g} Pa s, {state} has about {model.viscosity(gas.temperature):.3g} Pa s"
+        )
+    for species in case.mechanism.species:
+        value = gas.diffusivity[species.name]
+        scaled = scaled_diffusivity(species, gas.carrier, gas.molar_mass, gas.temperature, gas.pressure)
+        if species.name in gas.scaled:
+            if carrier_ratio(species, gas.carrier, gas.molar_mass) is None:
+                found.append(
+                    f"gas.diffusivity of {species.name} is that in N2, {scaled:.3g} m2/s: nothing is known of it in {gas.carrier}, "
+                    "give a value"
+                )
+        elif value > 0.0 and _apart(value, scaled):
+            found.append(
+                f"gas.diffusivity of {species.name} is {value:.3g} m2/s, in {state} it would be about {scaled:.3g} m2/s: "
+                "left out, it is scaled"
+            )
+    return found
+
+
+def _apart(value: float, expected: float) -> bool:
+    return not expected / SAME_PROPERTY <= value <= expected * SAME_PROPERTY
+
+
+def mass_caveats(case: Case) -> list[str]:
+    """Molar masses that contradict the formula, of gas species, sites, films and the carrier."""
+    found = []
+    mechanism = case.mechanism
+    for kind, parts in (
+        ("species", mechanism.species),
+        ("site", mechanism.sites),
+        ("film", mechanism.films),
+    ):
+        for part in parts:
+            formula = formula_mass(part.elements)
+            if part.molar_mass is not None and formula is not None:
+                found += _wrong_mass(f"chemistry.{kind}.{part.name}.molar_mass", part.molar_mass, formula)
+    model = CARRIERS.get(case.gas.carrier)
+    if model is not None:
+        found += _wrong_mass("gas.molar_mass", case.gas.molar_mass, model.molar_mass)
+    return found
+
+
+def _wrong_mass(key: str, found: float, expected: float) -> list[str]:
+    if abs(found - expected) <= SAME_MASS * expected:
+        return []
+    return [
+        f"{key} is {found * 1e3:.6g} g/mol, its formula has {expected * 1e3:.5g} g/mol: {found / expected:.4g} times as much"
+    ]

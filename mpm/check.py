@@ -7,9 +7,10 @@ from typing import Any
 
 from mpm import engineering as eng
 from mpm.case import Case
-from mpm.caveats import profile_caveats
+from mpm.caveats import gas_caveats, mass_caveats, profile_caveats
 from mpm.chemistry import inlet_concentrations
 from mpm.dem.relations import (
+    mean_free_path,
     minimum_fluidisation_velocity,
     perfect_flight_velocity,
     straight_drop_velocity,
@@ -17,6 +18,7 @@ from mpm.dem.relations import (
 )
 from mpm.geometry import Grid
 from mpm.layout import Inlet, Layer
+from mpm.materials import Material
 from mpm.motion import Vibration
 from mpm.saturation import coverage_met, slowest_turnover, uptake
 from mpm.schedule import Schedule
@@ -24,6 +26,8 @@ from mpm.schedule import Schedule
 SMEARED = 0.1
 """Numerical over molecular diffusion along x that deserves a warning: 0.44 raised the coverage before the inlet by 0.008 in the zone, 0.19
 by 0.002 (docs/open_question.md)."""
+CONTINUUM = 0.01
+"""Knudsen number of the pores from which slip counts: it adds 8 Kn to the permeability (Klinkenberg 1941), 8 % here."""
 DILUTE = 0.02
 """Mass fraction above which a feed is no longer dilute: the gas keeps the density and viscosity of its carrier."""
 
@@ -51,6 +55,14 @@ def check_case(case: Case) -> dict[str, Any]:
             "density": case.gas.density,
             "viscosity": case.gas.viscosity,
             "molar_mass": case.gas.molar_mass,
+            "mean_free_path": _free_path(case),
+            "diffusivity": dict(case.gas.diffusivity),
+            "diffusivity_from": {
+                name: "scaled" if name in case.gas.scaled else "typed" for name in case.gas.diffusivity
+            },
+        },
+        "pores": {
+            layer.name: _pores(case, layer.material) for layer in case.geometry.layers if layer.material
         },
         "motion": _motion(case),
         "inlets": {inlet.name: _inlet(case, inlet) for inlet in case.geometry.inlets},
@@ -72,6 +84,16 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def _free_path(case: Case) -> float:
+    gas = case.gas
+    return mean_free_path(gas.viscosity, gas.pressure, gas.temperature, gas.molar_mass)
+
+
+def _pores(case: Case, material: Material) -> dict[str, float]:
+    diameter = eng.pore_diameter(material)
+    return {"diameter": diameter, "Knudsen": eng.knudsen(_free_path(case), diameter)}
 
 
 def _motion(case: Case) -> dict[str, float | str | None]:
@@ -160,11 +182,11 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
 
 
 def warnings(case: Case, report: dict[str, Any]) -> list[str]:
-    """What is legal but questionable, one sentence each."""
-    found = profile_caveats(case)
+    """What is legal but questionable, one sentence each. A number that `report` lacks was not finite."""
+    found = [*profile_caveats(case), *gas_caveats(case), *mass_caveats(case)]
     motion, bed = report["motion"], report.get("bed", {})
     speed = abs(case.motion.mean_velocity)
-    if case.motion.gamma > 0.0 and bed and speed > motion["perfect_flight"]:
+    if case.motion.gamma > 0.0 and bed and speed > motion.get("perfect_flight", math.inf):
         found.append(
             f"the bed is conveyed at {speed * 100:.3g} cm/s, above perfect flight, "
             f"{motion['perfect_flight'] * 100:.3g} cm/s: no particle hops that fast"
@@ -182,12 +204,20 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
                 f"inlet {inlet.name} feeds a mass fraction of {feed:.3g}, not dilute (above {DILUTE}): density and "
                 "viscosity stay those of the carrier"
             )
-    courant = report["run"]["flow_courant"]
+    for name, pores in report["pores"].items():
+        kn = pores.get("Knudsen", math.inf)
+        if kn > CONTINUUM:
+            found.append(
+                f"layer {name}: Kn = {kn:.2g}, mean free path {_free_path(case) * 1e6:.2g} um over pores of "
+                f"{pores['diameter'] * 1e6:.3g} um: outside the continuum (above {CONTINUUM:g}) gas slips along the walls; permeability "
+                f"should be about 1 + 8 Kn = {1.0 + 8.0 * kn:.3g} times as large (Klinkenberg), D_eff smaller"
+            )
+    courant = report["run"].get("flow_courant", math.inf)
     if courant > 1.0 and case.fidelity != "steady":
         found.append(
             f"the gas passes {courant:.2g} cells in a step of the cycle (CFL above 1): raise time.steps_per_cycle"
         )
-    smeared = report["run"]["numerical_diffusion"]
+    smeared = report["run"].get("numerical_diffusion", math.inf)
     if smeared > SMEARED and case.fidelity != "steady":
         otherwise = ", or fidelity averaged, which has no swinging gas" if case.fidelity == "resolved" else ""
         found.append(

@@ -100,6 +100,22 @@ def front_thickness(surface_to_volume: float, rate_constant: float, diffusivity:
     return math.sqrt(diffusivity / (surface_to_volume * rate_constant))
 
 
+def pore_diameter(material: Material) -> float:
+    """Diameter [m] of the straight capillaries with the layer's permeability, d = sqrt(32 tau^2 K/eps), the narrower direction.
+
+    Hagen and Poiseuille: K = eps d^2/(32 tau^2), with tau^2 the tortuosity factor.
+    """
+    return min(
+        math.sqrt(32.0 * tortuosity * permeability / material.porosity)
+        for tortuosity, permeability in zip(material.tortuosity_factor, material.permeability, strict=True)
+    )
+
+
+def knudsen(free_path: float, diameter: float) -> float:
+    """Kn = l/d: mean free path over the diameter of a pore. Gas is a continuum below about 0.01."""
+    return free_path / diameter
+
+
 def flow_resistance(case: Case) -> float:
     """Sum of h/k_y over the porous layers [1/m]: pressure drop over viscosity and superficial velocity (Darcy)."""
     return sum(

@@ -148,7 +148,7 @@ class Material(BaseModel):
 def kozeny_carman(porosity: float, diameter: float, sphericity: float, constant: float) -> float:
     """Permeability k = eps^3 / (c0 s_v^2 (1 - eps)^2) [m2] with s_v = 6/(phi d), the surface per solid volume.
 
-    Equation 5-1 of the thesis; c0 = 5 for packed spheres (Carman 1937), 4.2 fitted for its glass beads (table 5.4).
+    Equations 5-2 and 5-3 of the thesis; c0 = 5 for packed spheres (Carman 1937), 4.2 fitted for its glass beads (table 5.4).
     """
     solid_surface = 6.0 / (sphericity * diameter)
     return porosity**3 / (constant * (solid_surface * (1.0 - porosity)) ** 2)

@@ -55,6 +55,11 @@ class Progress:
             self.status.start()
         return self
 
+    def warn(self, text: str) -> None:
+        """A line that stays, for the person who watches."""
+        if self.shown:
+            self.console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mpm import checkpoint, fem  # noqa: F401  (fem first: it loads the finite-element stack)
 from mpm.balances import LIMIT, require_balance, worst_balance
 from mpm.bed import Bed
+from mpm.check import check_case
 from mpm.diagnostics import State, Totals, total_concentration
 from mpm.dispersion import vibrational_dispersion
 from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
@@ -107,6 +108,9 @@ class Reactor:
                 self.grid.cells,
                 self.comm.size,
             )
+            for warning in check_case(self.case)["warnings"]:
+                log.warning("warning: %s", warning)
+                bar.warn(warning)
             if self.case.fidelity == "steady":
                 return self._run_steady(directory, callback, bar)
             try:

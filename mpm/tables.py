@@ -104,6 +104,17 @@ def _number_table(case: Case, report: dict[str, Any]) -> Listing:
 
     row("gas density", gas["density"], "kg/m3")
     row("gas viscosity", gas["viscosity"], "Pa s")
+    for value, origin in dict.fromkeys(
+        (d, gas["diffusivity_from"][s]) for s, d in gas["diffusivity"].items()
+    ):
+        alike = [
+            s for s, d in gas["diffusivity"].items() if (d, gas["diffusivity_from"][s]) == (value, origin)
+        ]
+        row(f"diffusivity, {origin}: {', '.join(alike)}", value, "m2/s")
+    row("mean free path of the gas", gas["mean_free_path"], "um", 1e6)
+    for name, pores in report["pores"].items():
+        row(f"{name}: diameter of its pores, sqrt(32 tau2 k/porosity)", pores["diameter"], "um", 1e6)
+        row(f"{name}: Knudsen number, mean free path over it", pores["Knudsen"])
     row("amplitude, horizontal", motion["amplitude_x"], "mm", 1e3)
     row("amplitude, vertical", motion["amplitude_y"], "mm", 1e3)
     row("peak velocity, horizontal (perfect flight)", motion["perfect_flight"], "cm/s", 1e2)

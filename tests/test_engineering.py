@@ -12,6 +12,8 @@ from mpm.check import check_case
 from mpm.cli import main
 from mpm.geometry import Grid
 
+from .cases import COARSE
+
 EXAMPLE = Path(__file__).parent / "example_case.toml"
 
 
@@ -222,3 +224,60 @@ def test_schema_and_versions(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     shown = capsys.readouterr().out
     assert all(name in shown for name in ("mpm", "python", "numpy", "dolfinx"))
+
+
+def vacuum(changes: dict[str, object] | None = None, gas: dict[str, object] | None = None) -> Case:
+    """The coarse steady zone with a gas of which nothing is typed but these."""
+    return load_case("single_zone", {**COARSE, "fidelity": "steady", "gas": gas or {}, **(changes or {})})
+
+
+def test_knudsen_number_of_the_pores(case: Case) -> None:
+    """l = mu/p sqrt(pi R T/(2 M)) over sqrt(32 tau2 K/eps); fails when a bed in vacuum passes as a continuum, or one at 1 atm does not."""
+    report = check_case(case)
+    assert report["gas"]["mean_free_path"] == pytest.approx(7.97e-8, rel=1e-3)
+    assert report["pores"]["bed"]["diameter"] == pytest.approx(
+        math.sqrt(32 * 1.48 * 4.25e-12 / 0.46), rel=1e-9
+    )
+    assert report["pores"]["bed"]["Knudsen"] == pytest.approx(3.81e-3, rel=2e-3)
+    found = check_case(vacuum(gas={"pressure": "1 torr"}))["warnings"]
+    assert sum("outside the continuum" in warning for warning in found) == 2  # bed and frit
+    assert any(
+        "layer bed: Kn = 4.2, mean free path 88 um over pores of 20.9 um" in warning for warning in found
+    )
+    assert not any("continuum" in w for w in check_case(vacuum(gas={"pressure": "626 torr"}))["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (
+            {"chemistry.species.TMA.molar_mass": "72.09 kg/mol"},
+            "chemistry.species.TMA.molar_mass is 72090 g/mol, its formula has 72.087 g/mol: 1000 times",
+        ),
+        ({"chemistry.site.OH.molar_mass": "17 kg/mol"}, "chemistry.site.OH.molar_mass"),
+        ({"chemistry.film.Al2O3.molar_mass": "26.98 g/mol"}, "chemistry.film.Al2O3.molar_mass"),
+        ({"gas.molar_mass": "28.01 kg/mol"}, "gas.molar_mass is 28010 g/mol"),
+        ({"gas.density": "0.7 g/m^3"}, "gas.density is 0.0007 kg/m3"),
+        ({"gas.viscosity": "1.72e-5 g/cm/s"}, "gas.viscosity is 1.72e-06 Pa s"),
+        ({"gas.diffusivity": "0.288 m^2/s"}, "gas.diffusivity of TMA is 0.288 m2/s, in N2 at 473 K"),
+        ({"gas.carrier": "Q", "gas.molar_mass": "30 g/mol", "gas.viscosity": "2e-5 Pa s"}, "nothing is known of it in Q"),
+    ],
+)  # fmt: skip
+def test_contradictions_are_said(change: dict[str, object], text: str) -> None:
+    """Fails when a molar mass off its formula, or a property off by a unit, passes without a word."""
+    base = vacuum()
+    assert not any(text in warning for warning in check_case(base)["warnings"])
+    assert any(text in warning for warning in check_case(base.with_(change))["warnings"])
+
+
+def test_a_run_says_what_check_warns_of(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Fails when the screen or the log of a run keeps quiet about what `mpm check` would have said."""
+    arguments = ["--set", "chemistry.species.TMA.molar_mass='72.09 kg/mol'", "--set", "fidelity=steady"]
+    for key, value in COARSE.items():
+        arguments += ["--set", f"{key}={value!r}"]
+    assert main(["run", "single_zone", "-o", str(tmp_path / "run"), *arguments]) == 0
+    assert "warning: chemistry.species.TMA.molar_mass is 72090 g/mol" in capfd.readouterr().err
+    assert (
+        "warning: chemistry.species.TMA.molar_mass is 72090 g/mol"
+        in (tmp_path / "run" / "run.log").read_text()
+    )
