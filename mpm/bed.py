@@ -73,7 +73,8 @@ class Bed:
     def advance(self, distance: float) -> int:
         """Slide the bed by `distance` [m] relative to the mesh; returns the number of whole columns it moved. Collective."""
         self.distance += distance
-        target = int(np.floor(self.distance / self.dx + 0.5 - TIE))
+        columns = np.floor(abs(self.distance) / self.dx + 0.5 - TIE)
+        target = int(np.copysign(columns, self.distance))
         count = target - self.shifted
         if count and len(self.moving_rows):
             whole = self.whole()

@@ -331,6 +331,14 @@ class Case(Frozen):
                     )
 
     @property
+    def direction(self) -> int:
+        """Which way solids are conveyed: -1 where a moving layer moves to the left in the mean, else 1.
+
+        They enter the strip and every zone at the end that they come from, left or right, and leave at the other.
+        """
+        return -1 if self.geometry.moving_layer is not None and self.motion.mean_velocity < 0.0 else 1
+
+    @property
     def mechanism(self) -> Mechanism:
         """The reaction mechanism, overrides included."""
         return self._mechanism

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.constants import GAS_CONSTANT
-from mpm.geometry import Grid
+from mpm.geometry import ON_EDGE, Grid
 
 if TYPE_CHECKING:
     from mpm.case import Case, Inlet, Zone
@@ -205,8 +205,9 @@ def zone_of(case: Case, inlet: Inlet) -> Zone | None:
 def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
     """Per dosing inlet: coverage of the site species that the half-reactions of its precursor make (`titrated`), 1 when saturated.
 
-    `box_mean`: mean over the moving layer from the left end of the inlet's zone to the inlet's centreline; `exit_profile`: the zone's
-    last column, bottom to top; `exit_mean`, `exit_min` of it. Without a moving layer the topmost reactive one counts.
+    `box_mean`: mean over the moving layer from the end of the inlet's zone at which solids enter it to the inlet's centreline;
+    `exit_profile`: the zone's column where they leave it, bottom to top; `exit_mean`, `exit_min` of it. Solids enter at the left and leave
+    at the right, a bed that moves backwards the other way (`Case.direction`). Without a moving layer the topmost reactive one counts.
     """
     layer = conveyed_layer(case)
     if layer is None:
@@ -220,8 +221,11 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
         if species is None or zone is None:
             continue
         theta = titrated(case, species, state.theta)[inside]
-        box = grid.columns_between(zone.start, inlet.center)
-        last = np.flatnonzero(grid.columns_between(zone.start, zone.end))[-1]
+        last = exit_column(case, grid, zone)
+        if last is None:
+            continue
+        box = grid.columns_between(zone.start, zone.end)
+        box &= case.direction * (grid.centres - inlet.center) < -ON_EDGE * grid.dx
         profile = theta[:, last]
         entry = {
             "exit_mean": float(profile @ heights / heights.sum()),
@@ -232,6 +236,12 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
             entry["box_mean"] = float((theta[:, box].mean(axis=1) @ heights) / heights.sum())
         result[inlet.name] = entry
     return result
+
+
+def exit_column(case: Case, grid: Grid, zone: Zone) -> int | None:
+    """The column where solids leave a zone: its last one, or its first where the bed moves to the left; None when it has none."""
+    columns = np.flatnonzero(grid.columns_between(zone.start, zone.end))
+    return int(columns[-1 if case.direction > 0 else 0]) if len(columns) else None
 
 
 def conveyed_layer(case: Case) -> str | None:

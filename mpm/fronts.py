@@ -21,7 +21,7 @@ from mpm.diagnostics import (
     running_surface,
     titrated,
 )
-from mpm.geometry import Grid
+from mpm.geometry import ON_EDGE, Grid
 
 if TYPE_CHECKING:
     from mpm.case import Case, Inlet
@@ -42,12 +42,20 @@ def crossing(distance: Floats, values: Floats, level: float) -> float | None:
     return float(distance[i - 1] + share * (distance[i] - distance[i - 1]))
 
 
+def column_of(grid: Grid, x: float, towards: int) -> int:
+    """The column that holds `x` [m]; on the edge of two the right (`towards` +1) or the left (-1) one, whatever rounding says."""
+    place = (x - grid.x[0]) / grid.dx
+    edge = round(place)
+    column = int(place) if abs(place - edge) > ON_EDGE else edge - (towards < 0)
+    return min(max(column, 0), grid.columns - 1)
+
+
 def walk(grid: Grid, start: float, direction: int) -> tuple[Floats, NDArray[np.int64]]:
     """Distances from `start` [m] and columns met when walking along the strip to the right (+1) or left (-1).
 
-    Once around a periodic strip, to the wall of a closed one. The first is the column that holds `start`.
+    Once around a periodic strip, to the wall of a closed one. The first is the column that holds `start`, or ends there.
     """
-    first = min(int((start - grid.x[0]) / grid.dx), grid.columns - 1)
+    first = column_of(grid, start, -direction)
     count = grid.columns if grid.periodic else (grid.columns - first if direction > 0 else first + 1)
     steps = np.arange(count)
     centre = grid.x[0] + (first + 0.5) * grid.dx
@@ -62,21 +70,21 @@ def layer_mean(grid: Grid, field: Floats, layer: str) -> Floats:
     return np.asarray(heights @ field[rows] / heights.sum())
 
 
-def front(grid: Grid, profile: Floats, feed: float, center: float) -> dict[str, float]:
-    """Fronts of a concentration profile (columns,) around an inlet at `center` [m] that feeds `feed` [mol/m3].
+def front(grid: Grid, profile: Floats, feed: float, center: float, along: int = 1) -> dict[str, float]:
+    """Fronts of a concentration profile (columns,) around an inlet at `center` [m] that feeds `feed` [mol/m3]; solids go `along` +x or -x.
 
     `upstream`, `downstream`: distance [m] from the inlet's centreline against and along the conveying direction at which the
     profile falls to half the feed; `upstream_width`: distance between 90 and 10 % of its largest value, upstream of that value.
     """
     result: dict[str, float] = {}
-    for name, direction in (("upstream", -1), ("downstream", 1)):
+    for name, direction in (("upstream", -along), ("downstream", along)):
         distance, columns = walk(grid, center, direction)
         at = crossing(distance, profile[columns], 0.5 * feed)
         if at is not None:
             result[name] = at
     top = int(np.argmax(profile))
     if profile[top] > 0.0:
-        distance, columns = walk(grid, grid.x[top] + 0.5 * grid.dx, -1)
+        distance, columns = walk(grid, grid.x[top] + 0.5 * grid.dx, -along)
         values = profile[columns] / profile[top]
         high, low = crossing(distance, values, 0.9), crossing(distance, values, 0.1)
         if high is not None and low is not None:
@@ -100,19 +108,19 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
         made = titrated(case, species, state.theta)
         entry: dict[str, Any] = {}
         for layer in case.geometry.layers:
-            numbers = front(grid, layer_mean(grid, field, layer.name), feed, inlet.center)
+            numbers = front(grid, layer_mean(grid, field, layer.name), feed, inlet.center, case.direction)
             coverage = _layer_coverage(grid, state, made, layer.name)
             if coverage is not None:
                 incoming = None
                 if layer.moving and case.geometry.bed_inflow == "fresh" and layer.material is not None:
                     fresh = layer.material.initial_coverage
                     incoming = sum(fresh.get(site, 0.0) for site in case.mechanism.titrated_sites(species))
-                at = coverage_front(grid, coverage, inlet.center, incoming)
+                at = coverage_front(grid, coverage, inlet.center, incoming, case.direction)
                 if at is not None:
                     numbers["coverage"] = at
             if numbers:
                 entry[layer.name] = numbers
-        height = _height(grid, field, 0.5 * feed, inlet)
+        height = _height(grid, field, 0.5 * feed, inlet, case.direction)
         if height is not None:
             entry["height"] = height
         if entry:
@@ -120,16 +128,18 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
     return result
 
 
-def coverage_front(grid: Grid, profile: Floats, center: float, incoming: float | None = None) -> float | None:
-    """Distance [m] upstream of an inlet's centreline at which a height-averaged coverage (columns,) passes 1/2.
+def coverage_front(
+    grid: Grid, profile: Floats, center: float, incoming: float | None = None, along: int = 1
+) -> float | None:
+    """Distance [m] upstream of an inlet's centreline at which a height-averaged coverage (columns,) passes 1/2; solids go `along` +x or -x.
 
     Negative when the coverage at the centreline is below 1/2 already: the front then lies that far downstream. `incoming` is the
-    coverage with which solids enter at the left end; they do not come round from the right then. None where there is no front.
+    coverage with which solids enter at the end they come from; they do not come round from the other then. None where there is no front.
     """
-    upstream = _half(grid, profile, center, -1, incoming)
+    upstream = _half(grid, profile, center, -along, incoming)
     if upstream is not None:
         return upstream
-    downstream = _half(grid, 1.0 - profile, center, 1, None if incoming is None else 1.0)
+    downstream = _half(grid, 1.0 - profile, center, along, None if incoming is None else 1.0)
     return None if downstream is None else -downstream
 
 
@@ -154,9 +164,9 @@ def _layer_coverage(grid: Grid, state: State, theta: Floats, layer: str) -> Floa
     return np.asarray(heights @ theta[inside] / heights.sum())
 
 
-def _height(grid: Grid, field: Floats, level: float, inlet: Inlet) -> float | None:
+def _height(grid: Grid, field: Floats, level: float, inlet: Inlet, along: int) -> float | None:
     """y at which the column above (or below) an inlet's centre crosses `level`, seen from the inlet."""
-    column = int(walk(grid, inlet.center, 1)[1][0])
+    column = column_of(grid, inlet.center, along)
     y = 0.5 * (grid.y[1:] + grid.y[:-1])
     values = field[:, column]
     at = crossing(y, values, level) if inlet.side == "bottom" else crossing(-y[::-1], values[::-1], level)
@@ -238,7 +248,7 @@ def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[
         if layer.moving and case.fidelity == "steady":
             length = abs(case.motion.mean_velocity)
         elif layer.moving:
-            length = totals.slid - (before.slid if before else 0.0)
+            length = case.direction * (totals.slid - (before.slid if before else 0.0))
         area = layer.material.surface_to_volume * layer.height * length
     for solid in case.mechanism.films:
         amount = grown = 0.0

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mpm.case import Case, Layer
 
 Floats = NDArray[np.float64]
+ON_EDGE = 1e-6  # of a column: places as close to each other are one
 Ints = NDArray[np.int64]
 
 
@@ -119,10 +120,14 @@ class Grid:
             is_open[np.argmax(overlap)] = True
         return is_open
 
+    @property
+    def centres(self) -> Floats:
+        """Middle of each column [m]."""
+        return 0.5 * (self.x[1:] + self.x[:-1])
+
     def columns_between(self, start: float, end: float) -> NDArray[np.bool_]:
         """Columns whose centre lies in [start, end) [m]."""
-        centres = 0.5 * (self.x[1:] + self.x[:-1])
-        return (centres >= start) & (centres < end)
+        return (self.centres >= start) & (self.centres < end)
 
 
 def row_heights(layer: Layer) -> Floats:

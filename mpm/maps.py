@@ -99,7 +99,7 @@ def map_figure(
     for panel in axes:
         panel.set_xlim(grid.x[0] * MM, grid.x[-1] * MM)
     axes[-1].set_xlabel(
-        "x [mm] (the bed moves to the right)" if moves_right(run.case) else "x [mm]",
+        f"x [mm]{way(run.case)}",
         labelpad=4 if len(moving) else 14 + LINE,  # below the names of the inlets
     )
     extend = "min" if isinstance(norm, LogNorm) else "neither"
@@ -115,8 +115,11 @@ def map_figure(
     return figure
 
 
-def moves_right(case: Case) -> bool:
-    return any(layer.moving for layer in case.geometry.layers) and case.motion.mean_velocity > 0.0
+def way(case: Case) -> str:
+    """Which way the bed moves, in words; nothing when it does not."""
+    if case.geometry.moving_layer is None or case.motion.mean_velocity == 0.0:
+        return ""
+    return f" (the bed moves to the {'right' if case.direction > 0 else 'left'})"
 
 
 def draw_layers(axes: Axes, case: Case, grid: Grid, inches: float) -> None:

@@ -26,6 +26,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mpm.diagnostics import exit_column
 from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, species_figure
 from mpm.results import Run, dosing_inlets, fed_species, load_run, made_sites, sites_made_by
 
@@ -148,21 +149,21 @@ def plot_log(axes: Axes, time: Floats, values: Floats, label: str, colour: str |
 
 
 def exits(run: Run) -> list[tuple[str, str, tuple[str, ...], int]]:
-    """Zone, inlet, site species that the inlet's precursor makes, and last column of each zone that doses a moving bed."""
+    """Zone, inlet, site species that its precursor makes, and the column where solids leave, of each zone that doses a moving bed."""
     if not any(layer.moving for layer in run.case.geometry.layers):
         return []
     inlets = {inlet.name: sites_made_by(run.case, inlet) for inlet in dosing_inlets(run.case)}
     found = []
-    for number, zone in enumerate(run.case.geometry.zones, start=1):
+    for zone in run.case.geometry.zones:
         sites = inlets.get(zone.inlet, ()) if zone.inlet else ()
-        columns = np.flatnonzero(run.grid.zone_of_column == number)
-        if zone.inlet and sites and len(columns):
-            found.append((zone.name, zone.inlet, sites, int(columns[-1])))
+        column = exit_column(run.case, run.grid, zone)
+        if zone.inlet and sites and column is not None:
+            found.append((zone.name, zone.inlet, sites, column))
     return found
 
 
 def exit_profile_figure(run: Run, count: int = 5) -> Figure:
-    """Coverage over height in the last column of each dosing zone, at up to `count` output times."""
+    """Coverage over height where solids leave each dosing zone, at up to `count` output times."""
     shown = exits(run)
     rows = run.grid.layer_rows(next(layer.name for layer in run.case.geometry.layers if layer.moving))
     y = 0.5 * (run.grid.y[1:] + run.grid.y[:-1])[rows] * MM

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from math import ceil, floor
 from typing import TYPE_CHECKING
 
-from mpm.motion import BedMotion
-
 if TYPE_CHECKING:
     from mpm.case import Case
 
@@ -45,7 +43,7 @@ def aligned_step(step: float, column: float, speed: float) -> float:
     Every column then meets the gas of a cell for equally long, where otherwise some would stay a step longer than their neighbours.
     A shift takes `column` / `speed` [m, m/s].
     """
-    if speed <= 0.0:
+    if speed == 0.0:
         return step
     shift = column / speed
     if shift >= step:
@@ -73,7 +71,7 @@ class Schedule:
             phases = n if case.motion.gamma > 0.0 else 1
             return cls(1.0 / case.motion.frequency / n, phases, case.motion.start, case.time.end)
         column = case.geometry.length / case.geometry.columns
-        step = aligned_step(case.time.step, column, BedMotion(case.motion).mean)
+        step = aligned_step(case.time.step, column, abs(case.motion.mean_velocity))
         return cls(step, 1, case.motion.start, case.time.end)
 
     @property

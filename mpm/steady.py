@@ -193,7 +193,7 @@ class SteadyProblem(SteadySystem):
         bed.theta[:, self.resting] = resting.coverage(at_rest, self.old[1][:, self.resting], LAST_STEP)
         if len(self.moving) and not self.periodic:
             entering = self.incoming()
-            last, first = self.column == bed.columns - 1, self.column == 0
+            last, first = self.column == self.last, self.column == self.first
             carried = bed.capacity[self.moving] / self.residence
             gone = self.theta[:, self.moving][:, last] @ carried[last] - entering[:, first] @ carried[first]
             bed.passed = total(self.strip.comm, gone)

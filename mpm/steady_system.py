@@ -1,11 +1,11 @@
 """The quasi-steady system: what gas and coverage must satisfy once nothing changes any more.
 
     div(u C_i - D_i^eff grad C_i) = eps R_i^gas + S sum_r nu_ir r_r            cycle-mean velocity u
-    n_s v_s dtheta/dx = n_s Q(C) theta     in the moving layer, from fresh or periodic solids
+    n_s v_s dtheta/dx = n_s Q(C) theta     in the moving layer, from fresh or periodic solids; v_s < 0: from the right end on
     0 = Q(C) theta                         in layers at rest
 
 The coverage is integrated exactly along the bed: solids that cross a cell of width h at its concentration leave with
-theta_out = theta_in exp(-nu_s k C h/(v_s n_s)) (one reaction; `SurfaceKinetics.conveyed` for two). Unknowns are the concentrations of the
+theta_out = theta_in exp(-nu_s k C h/(|v_s| n_s)) (one reaction; `SurfaceKinetics.conveyed` for two). Unknowns are the concentrations of the
 reacting species, theta_out of every moving cell and, where outlets draw gas back in, what that gas holds: the mean of the cells next to
 each outlet. A storage term over a pseudo-time step [s] can be added; over LAST_STEP it is below rounding.
 """
@@ -48,8 +48,8 @@ class SteadySystem:
             )
         self.kinds = len(bed.theta)
         self.free = self.kinds - 1  # independent coverages of a moving cell
-        velocity = reactor.motion.mean
-        moving_rows = set(bed.moving_rows) if velocity > 0.0 else set()
+        speed, self.direction = abs(reactor.motion.mean), reactor.case.direction
+        moving_rows = set(bed.moving_rows) if speed > 0.0 else set()
         self.is_moving = np.array([place in moving_rows for place in bed.place], dtype=bool).reshape(
             len(bed.cells)
         )
@@ -57,7 +57,7 @@ class SteadySystem:
         self.place = np.full(self.own, -1)  # of own cells in `bed.cells`; -1 where nothing reacts on solids
         self.place[bed.cells] = np.arange(len(bed.cells))
         self.place_moving = np.cumsum(self.is_moving) - 1  # of moving cells of `bed.cells` in `moving`
-        self.residence = strip.grid.dx / velocity if velocity > 0.0 else np.inf
+        self.residence = strip.grid.dx / speed if speed > 0.0 else np.inf
         self.periodic = bed.periodic
         self.operators = transport.operators(number)
         self.cells = CellMatrix(strip, self.b)
@@ -91,15 +91,19 @@ class SteadySystem:
         everyone = bed.scatter.to_all(mine).reshape(len(bed.rows), bed.columns).astype(np.int64)
         self.theta_number = first + self.b * self.own + self.free * np.arange(len(self.moving))
         rows, columns = bed.place[self.moving], strip.column[bed.cells[self.moving]]
-        before = everyone[rows, columns - 1]
-        self.upstream = np.where((columns > 0) | self.periodic, before, -1)
+        self.before = (
+            columns - self.direction
+        ) % bed.columns  # where the solids of each moving cell come from
+        self.first, self.last = (0, bed.columns - 1) if self.direction > 0 else (bed.columns - 1, 0)
+        inside = (columns != self.first) | self.periodic
+        self.upstream = np.where(inside, everyone[rows, self.before], -1)
         self.column = columns
 
     def incoming(self) -> Floats:
         """Coverage of the solids entering every own moving cell, (sites, moving)."""
         whole = self.bed.scatter.to_all(self.theta).reshape(self.kinds, len(self.bed.rows), self.bed.columns)
         rows = self.bed.place[self.moving]
-        entering = whole[:, rows, self.column - 1]
+        entering = whole[:, rows, self.before]
         fresh = self.bed.fresh[:, rows]
         return np.where(self.upstream >= 0, entering, fresh)
 
@@ -266,9 +270,13 @@ class SteadySystem:
         )  # (columns, rows, out, in)
         aged = (1.0 - share) * np.moveaxis(whole[k * k :], (0, 1, 2), (2, 1, 0))  # (columns, rows, sites)
         incoming = bed.fresh[:, bed.moving_rows].T
+        theta = np.empty_like(aged)
+        m, aged = (
+            m[:: self.direction],
+            aged[:: self.direction],
+        )  # in the order in which solids meet the columns
         if self.periodic:
             incoming = _fixed_point(m, aged, share, incoming)
-        theta = np.empty_like(aged)
         for j in range(len(m)):
             incoming = np.einsum("roi,ri->ro", m[j], share * incoming + aged[j])
             incoming = np.maximum(incoming, 0.0)
@@ -276,7 +284,7 @@ class SteadySystem:
                 axis=1, keepdims=True
             )  # rounding would add up along the bed
         result = np.zeros((k, len(bed.rows), bed.columns))
-        result[:, bed.moving_rows] = np.moveaxis(theta, (0, 1, 2), (2, 1, 0))
+        result[:, bed.moving_rows] = np.moveaxis(theta[:: self.direction], (0, 1, 2), (2, 1, 0))
         new = self.theta.copy()
         new[:, self.moving] = bed.scatter.to_local(result.reshape(k, -1))[:, self.moving]
         self.theta = new
