@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.courant import check_bounded
 from mpm.errors import ConvergenceError
 from mpm.flow import FlowProblem
 from mpm.motion import REST, BedMotion, StepMotion, step_motion
@@ -87,7 +88,7 @@ def periodic_flow(
     cycle's mean satisfies the steady equations with the cycle's mean convection. What it lacks after a cycle is the slow start-up drift
     of the headspace (about 0.7 s): a Newton step on those equations removes it at once, where marching would take 100 cycles.
     Periodicity is judged on velocities alone. `watch(cycle, change)` is called after every cycle. Raises ConvergenceError after
-    CYCLE_LIMIT cycles.
+    CYCLE_LIMIT cycles, or as soon as the flow diverges because its steps are too long.
     """
     motions = cycle_motions(bed, problem.dt, phases)
     steady_flow(problem, mean_motion(bed))
@@ -101,6 +102,7 @@ def periodic_flow(
     )
     # of the last cycle, as vectors; the next one takes their places, because two or their fields would be much to hold beside the factors
     states: list[Floats] = []
+    velocities = problem.velocities()
     for cycle in range(CYCLE_LIMIT):
         convective_mean = problem.convective_force().duplicate()
         state_mean = np.zeros_like(problem.state.x.array)
@@ -109,12 +111,13 @@ def periodic_flow(
             force = problem.convective_force()
             convective_mean.axpy(1.0 / phases, force)
             problem.step(motion, force)
+            before, velocities = velocities, problem.velocities()
+            check_bounded(problem.case, problem.strip, before, velocities, problem.dt)
             state_mean += problem.state.x.array / phases
             state = problem.state.x.array.copy()
             if cycle == 0:
                 states.append(state)
                 continue
-            velocities = problem.velocities()
             speed = max(speed, np.abs(velocities).max(initial=0.0))
             change = max(change, np.abs(velocities - problem.velocities(states[phase])).max(initial=0.0))
             states[phase] = state

@@ -259,10 +259,10 @@ class Reactor:
     def _take(self, step: Step) -> None:
         """One step: the bed slides, then gas and coverage follow over the new position."""
         assert self.flows is not None
-        number = self.flows.number(step, self.transport)
         memento = self.bed.memento()
-        self.bed.advance(self._slide(step))
         try:
+            number = self.flows.number(step, self.transport)
+            self.bed.advance(self._slide(step))
             self.transport.advance(number, step.t0, step.dt)
         except ConvergenceError as error:
             self.bed.recall(memento)

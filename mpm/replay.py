@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.courant import check_bounded
 from mpm.cycle import FlowField, mean_field, mean_motion, periodic_flow, steady_flow
 from mpm.flow import FlowProblem, face_flow
 from mpm.motion import BedMotion, step_motion
@@ -81,7 +82,7 @@ class March:
     """
 
     def __init__(self, case: Case, strip: Strip, bed: BedMotion, schedule: Schedule):
-        self.strip, self.bed, self.schedule = strip, bed, schedule
+        self.case, self.strip, self.bed, self.schedule = case, strip, bed, schedule
         self.problem = FlowProblem(case, strip, schedule.dt, refined=True)
         resting = schedule.step(0).whole
         same = abs(resting - schedule.dt) < 1e-12 * schedule.dt
@@ -94,12 +95,14 @@ class March:
         transport.add_flow(face_flow(self.strip, self.current.velocities))
 
     def number(self, step: Step, transport: Transport) -> int:
-        """March to the end of `step` (once) and hand its field to the transport."""
+        """March to the end of `step` (once) and hand its field to the transport. Raises ConvergenceError, the old field kept."""
         if self.done == step.index:
             problem = self.resting if step.phase == RESTING else self.problem
             problem.set_state(self.current.velocities, self.current.pressure)
             problem.step(step_motion(self.bed, step.since, step.since + step.whole))
-            self.current = FlowField.of(problem)
+            reached = FlowField.of(problem)
+            check_bounded(self.case, self.strip, self.current.velocities, reached.velocities, problem.dt)
+            self.current = reached
             self.done += 1
             self.recent = (
                 [*self.recent[1 - self.schedule.phases :], self.current]
