@@ -219,7 +219,13 @@ def optimise(
     loaded = load_case(case, parse_settings(settings))
     directory = output or Path("results") / "optimise" / Path(case).stem
 
+    from mpi4py import MPI
+
     from mpm import optimise as search
+    from mpm.parallel import on_root
+
+    search.checked_doses(loaded, target, weight, velocities, limit)  # bad input leaves nothing behind
+    on_root(MPI.COMM_WORLD, lambda: search.make_directory(directory))
 
     def say(point: search.Point) -> None:
         exits = ", ".join(f"{name} {value:.4f}" for name, value in point.exits.items())

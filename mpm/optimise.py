@@ -13,6 +13,8 @@ from __future__ import annotations
 import csv
 import io
 import logging
+import math
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +32,7 @@ from mpm.replay import Replay
 
 if TYPE_CHECKING:
     from mpm.case import Case
+    from mpm.layout import Inlet
 
 log = logging.getLogger("mpm")
 RICHEST, LEANEST = 0.02, 1e-6  # mass fractions: dilute gas above, nothing happens below
@@ -69,13 +72,17 @@ class Point:
 
 
 def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
-    """Mass fraction (and port velocity) of every dosed inlet, starting where the dose ratio is `target`. Raises InputError."""
+    """Mass fraction (and port velocity) of every dosed inlet, starting where the dose ratio is `target`.
+
+    Raises InputError for a case in which a steady dose has nothing to titrate, or more than one precursor could be meant.
+    """
     doses = []
     for inlet in case.geometry.inlets:
         excess = inlet_excess(case, inlet)
         if excess is None:
             continue
         species, _, ratio = excess
+        refuse_inlet(case, inlet)
         if ratio is None:
             raise InputError(
                 f"optimise: found inlet {inlet.name}, whose precursor {species} never saturates the surface; accepted: reactions that end"
@@ -88,10 +95,51 @@ def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
             v = inlet.velocity
             doses.append(Dose(f"{key}.velocity", v, v / VELOCITIES, v * VELOCITIES, "m/s"))
     if not doses:
+        if case.geometry.moving_layer is None or case.motion.mean_velocity == 0.0:
+            found = "a bed that does not move"
+        elif not case.mechanism.surface_reactions:
+            found = "a mechanism without surface reactions"
+        else:
+            found = "no inlet that feeds a precursor of the surface reactions"
         raise InputError(
-            "optimise: found no inlet that doses a moving bed; accepted: a case with one inlet or more that feeds a precursor"
+            f"optimise: found {found}; accepted: a bed that moves past one inlet or more that dose it"
         )
     return doses
+
+
+def checked_doses(case: Case, target: float, weight: float, velocities: bool, limit: int) -> list[Dose]:
+    """`doses_of` with the numbers of the command line checked, too. Raises InputError."""
+    if not 0.0 < target <= 1.0:
+        raise InputError(f"optimise: --target: found {target:g}; accepted: above 0 and at most 1")
+    if not 0.0 <= weight < math.inf:
+        raise InputError(f"optimise: --weight: found {weight:g}; accepted: a finite number from 0")
+    if limit < 1:
+        raise InputError(f"optimise: --limit: found {limit}; accepted: a whole number from 1")
+    return doses_of(case, target, velocities)
+
+
+def refuse_inlet(case: Case, inlet: Inlet) -> None:
+    """Raise InputError for a dosing inlet whose dose the search could not choose or whose effect it could not see."""
+    key = f"optimise: geometry.inlet.{inlet.name}"
+    fed = [
+        name for name, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reactions(name)
+    ]
+    if inlet.velocity == 0.0:
+        raise InputError(
+            f"{key}.velocity: found 0 m/s, a port that doses nothing; accepted: a velocity above 0 m/s"
+        )
+    if len(fed) > 1:
+        raise InputError(
+            f"{key}.mass_fractions: found the precursors {', '.join(fed)}; accepted: one in each inlet"
+        )
+    if math.isfinite(inlet.windows[-1][1]):
+        raise InputError(
+            f"{key}: found doses that end at {inlet.windows[-1][1]:g} s; accepted: an inlet that doses without end, as in a steady state"
+        )
+    if all(zone.inlet != inlet.name for zone in case.geometry.zones):
+        raise InputError(
+            f"{key}: found no zone that it doses, so that its exit is not known; accepted: a geometry.zone with inlet = {inlet.name!r}"
+        )
 
 
 class Search:
@@ -133,7 +181,7 @@ class Search:
             doses,
             {name: entry["exit_mean"] for name, entry in summary["titration"].items()},
             sum(summary["species"][name]["fed"] for name in dosed),
-            summary["cvd"].get("total", 0.0),
+            summary.get("cvd", {}).get("total", 0.0),  # absent without a gas-phase reaction
         )
         self.points.append(point)
         return point
@@ -160,9 +208,7 @@ def optimise(
     `weight`: moles of precursor that one mole of CVD is worth; `limit`: steady states at most. Raises InputError, and ConvergenceError
     when no dose within bounds reaches the target.
     """
-    if not 0.0 < target <= 1.0:
-        raise InputError(f"optimise: --target: found {target:g}; accepted: above 0 and at most 1")
-    search = Search(case, doses_of(case, target, velocities), target, weight)
+    search = Search(case, checked_doses(case, target, weight, velocities, limit), target, weight)
 
     def solved(logs: NDArray[np.float64]) -> Point | None:
         before = len(search.points)
@@ -209,9 +255,17 @@ def optimise(
     return best, search.case_at(best.doses).with_({"fidelity": case.fidelity}), search
 
 
+def make_directory(directory: Path) -> None:
+    """Make the directory of the results, before the search that would be lost; InputError when nothing can be written there."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=directory).close()
+    except OSError as error:
+        raise InputError(f"{directory}: cannot be used as output directory ({error.strerror})") from None
+
+
 def write_search(directory: Path, best: Case, search: Search) -> None:
     """`case.toml`, the case with the best doses, and `points.csv`, every steady state [SI]."""
-    directory.mkdir(parents=True, exist_ok=True)
     write_atomically(directory / "case.toml", best.to_toml())
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")

@@ -2,7 +2,10 @@
 
 import csv
 import json
+import math
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -65,7 +68,58 @@ def test_what_cannot_be_reached_is_said() -> None:
     """Fails when a target out of range, a case without a dose, or a target beyond every dose within bounds is not refused."""
     with pytest.raises(InputError, match="--target"):
         optimise(zone(mesh=TINY), target=1.5)
-    with pytest.raises(InputError, match="inlet"):
-        optimise(zone({"geometry.inlet.tma.mass_fractions": {"TMA": 0.0}}, TINY))
+    for option in ({"weight": -1.0}, {"weight": math.nan}, {"limit": 0}, {"target": math.nan}):
+        with pytest.raises(InputError, match=f"--{next(iter(option))}: found"):
+            optimise(zone(mesh=TINY), **option)  # type: ignore[arg-type]
     with pytest.raises(ConvergenceError, match="none of"):
         optimise(zone(mesh=TINY), target=1.0, limit=1)
+
+
+INLET = "geometry.inlet.tma"
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        ({f"{INLET}.mass_fractions": {"TMA": 0.0}}, "no inlet that feeds a precursor"),
+        ({f"{INLET}.velocity": "0 m/s"}, f"{INLET}.velocity: found 0 m/s"),
+        ({f"{INLET}.mass_fractions": {"TMA": 2e-4, "H2O": 1e-4}}, "found the precursors TMA, H2O"),
+        ({f"{INLET}.stop": "2 s"}, "found doses that end at 2 s"),
+        (
+            {"geometry.zone": [{"name": "all", "start": "0 mm", "end": "139.7 mm"}]},
+            "found no zone that it doses",
+        ),
+        ({"motion.bed_velocity": "0 m/s"}, "found a bed that does not move"),
+    ],
+)
+def test_a_dose_that_titrates_nothing_is_refused(change: dict[str, Any], found: str) -> None:
+    """Fails when a search starts whose result could not mean anything, or a traceback tells of it."""
+    with pytest.raises(InputError, match=re.escape(found)):
+        optimise(zone(change, TINY))
+
+
+SURFACE_ALONE = {
+    "mechanism": "inline",
+    "species": {
+        "TMA": {"formula": "Al(CH3)3", "molar_mass": "72.09 g/mol"},
+        "CH4": {"molar_mass": "16.04 g/mol"},
+    },
+    "site": {"OH": {}, "OAl(CH3)2": {}},
+    "reaction": {"tma": {"equation": "OH + TMA -> CH4 + OAl(CH3)2", "sticking": 0.01}},
+}
+
+
+def test_without_a_gas_reaction_the_dose_is_that_of_the_mass_balance() -> None:
+    """Fails when a mechanism without gas-phase reactions, whose summary has no CVD, stops the search or changes its dose."""
+    best, _, _ = optimise(zone({"chemistry": SURFACE_ALONE}, TINY), target=0.5)
+    with_gas, _, _ = optimise(zone(mesh=TINY), target=0.5)
+    assert best.cvd == 0.0 and best.exits["tma"] == pytest.approx(0.5, abs=0.005)
+    assert best.doses == pytest.approx(with_gas.doses, rel=0.01)
+
+
+def test_a_directory_that_cannot_be_written_is_refused_before_the_search(tmp_path: Path) -> None:
+    """Fails when the search is done first and its result lost, or bad input leaves a directory behind."""
+    (tmp_path / "file").write_text("")
+    assert main(["optimise", "single_zone", "-o", str(tmp_path / "file" / "below")]) == 2
+    assert main(["optimise", "single_zone", "-o", str(tmp_path / "new"), "--limit", "0"]) == 2
+    assert not (tmp_path / "new").exists()
