@@ -7,7 +7,6 @@ cycle, `averaged` its mean, both after the field at rest. An impulsive start mar
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +14,13 @@ from numpy.typing import NDArray
 from mpm.courant import check_bounded
 from mpm.errors import ConvergenceError
 from mpm.flow import FlowProblem
-from mpm.motion import REST, BedMotion, StepMotion, step_motion
+from mpm.motion import BedMotion, StepMotion, step_motion
 from mpm.parallel import largest
+from mpm.steadyflow import FlowField, steady_flow
 
 Floats = NDArray[np.float64]
-NEWTON_LIMIT = 25
-STEADY = 1e-9  # residual of the steady flow, relative to its forcing (rounding of the drag leaves 1e-10)
 PERIODIC = 1e-6  # change of the velocities from one cycle to the next, relative to the fastest
 CYCLE_LIMIT = 200
-
-
-@dataclass(frozen=True, eq=False)
-class FlowField:
-    """Velocities at the bottom, left, right and top of every local cell (4, cells) [m/s] and pressure (cells,) [Pa]."""
-
-    velocities: Floats
-    pressure: Floats
-
-    @classmethod
-    def of(cls, problem: FlowProblem) -> FlowField:
-        return cls(problem.velocities(), problem.pressure().copy())
 
 
 def mean_field(fields: list[FlowField]) -> FlowField:
@@ -52,31 +38,6 @@ def cycle_motions(bed: BedMotion, dt: float, phases: int) -> list[StepMotion]:
 def mean_motion(bed: BedMotion) -> StepMotion:
     """Forcing averaged over a cycle: the frame's means vanish, the bed's mean velocity remains."""
     return StepMotion(bed.mean, 0.0, 0.0, 0.0)
-
-
-def steady_flow(problem: FlowProblem, motion: StepMotion = REST) -> FlowField:
-    """Steady flow with convection under constant forcing; leaves it in `problem.state`.
-
-    Newton's method; the linear systems by GMRES with the factored Stokes-Darcy operator as preconditioner, so one factor serves.
-    Raises ConvergenceError.
-    """
-    force = problem.convective_force()
-    force.set(0.0)
-    problem.settle(motion, force)
-    scale = None
-    for _ in range(NEWTON_LIMIT):
-        residual, size = problem.steady_residual(motion)
-        scale = max(size, 1e-300) if scale is None else scale
-        worst = residual.norm() / scale
-        if worst < STEADY:
-            return FlowField.of(problem)
-        if not np.isfinite(worst):
-            break
-        problem.newton_update(residual)
-    raise ConvergenceError(
-        f"steady flow: Newton stopped after {NEWTON_LIMIT} iterations at a residual of {worst:.3g} of the forcing; "
-        "the flow may have no steady state: try fidelity resolved with startup impulsive"
-    )
 
 
 def periodic_flow(
@@ -128,8 +89,7 @@ def periodic_flow(
             return [_field(problem, state) for state in states]
         last = problem.state.x.array.copy()
         problem.state.x.array[:] = state_mean
-        residual, _ = problem.steady_residual(mean, convective_mean)
-        problem.newton_update(residual)
+        problem.newton_update(problem.steady_residual(mean, convective_mean))
         problem.state.x.array[:] += last - state_mean
         convective_mean.destroy()
     raise ConvergenceError(

@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.cellmatrix import CellMatrix
-from mpm.cycle import FlowField, mean_field, periodic_flow
+from mpm.cycle import mean_field, periodic_flow
 from mpm.flow import FlowProblem, face_flow
 from mpm.fluxes import FluxAssembler, effective_diffusivity
 from mpm.motion import BedMotion
 from mpm.parallel import total
 from mpm.solvers import DirectSolver
+from mpm.steadyflow import FlowField
 from mpm.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 
 if TYPE_CHECKING:

@@ -1,11 +1,13 @@
 """Gas flow: Darcy-Brinkman with convection in the frame of the vibrating reactor.
 
     div u = 0
-    (rho/eps) du/dt + (rho/eps^2) u.grad u = -grad p + div(mu_e grad u) - (mu/K) (u - eps v_s) - rho a(t)
+    (rho/eps) (du/dt + u.grad(u/eps)) = -grad p + div(mu_e grad U) - (mu/K) (U - v_s) - rho a(t),   U = u + (1-eps) v_s
 
 `u` is the superficial gas velocity relative to the mesh [m/s], `v_s` the bed's velocity relative to the mesh and `a` the mesh's
-acceleration; gravity and the vertical acceleration are gradients and vanish into the pressure `p` [Pa]. Gas layers have eps = 1 and
-1/K = 0. Walls are no-slip, ports prescribe the normal velocity, outlets have p = 0 and no tangential velocity gradient.
+acceleration; gravity and the vertical acceleration are gradients and vanish into the pressure `p` [Pa]. `U`, the volume flux of gas and
+solids together, is continuous across the faces of the moving bed and as free of divergence as u: gas at the surface of the bed moves with
+v_s, pore gas is carried at eps v_s. Gas layers have eps = 1, 1/K = 0 and U = u. Walls are no-slip, ports prescribe the normal velocity,
+outlets have p = 0 and no tangential velocity gradient. Where a bed passes the closed ends of a strip, u = 0 there and U = (1-eps) v_s.
 
 Discretisation: Raviart-Thomas of lowest order on quadrilaterals with piecewise constant pressure. The flux through every facet is one
 unknown and div u vanishes exactly in every cell: the marker-and-cell scheme, written as forms. Convection is explicit, so one factor
@@ -92,6 +94,18 @@ class FlowProblem:
         self._facet_dofs, self._pressure_dofs = dofs[:, :4], dofs[:, 4]
         return weights
 
+    def _moving_solids(self) -> dolfinx.fem.Function:
+        """(1 - eps) along x in the moving layer: the volume flux of the solids per unit bed velocity, as a mixed vector."""
+        solids = dolfinx.fem.Function(self.space, name="solids")
+        share = self.medium.moving_solid
+        inside = np.flatnonzero(share.x.array[share.function_space.dofmap.list[:, 0]] > 0.0)
+        values = share.x.array[share.function_space.dofmap.list[inside, 0]]
+        for side in (LEFT, RIGHT):
+            dofs = self._facet_dofs[inside, side]
+            solids.x.array[dofs] = self._weights[dofs] * values
+        solids.x.scatter_forward()
+        return solids
+
     def _port_values(self) -> tuple[Floats, Floats]:
         """Prescribed normal velocities (as unknowns): of the inlets at rest, and per unit vertical velocity of the frame.
 
@@ -146,10 +160,13 @@ class FlowProblem:
             stokes += -level * p * q * dx
         self.steady_matrix = _matrix(stokes)
         self.mass_matrix = _matrix(inertia(u, v, m) + dolfinx.fem.Constant(self.strip.mesh, 0.0) * p * q * dx)
-        self.entrainment = _vector(bed_entrainment(v, m))
+        self.entrainment = _vector(bed_entrainment(ufl.split(self._moving_solids())[0], v, m, closed))
         self.acceleration = _vector(frame_acceleration(v, m))
         velocity, _ = ufl.split(self.state)
-        self._convection_form = convection(velocity, v, m)
+        self.convection_share = dolfinx.fem.Constant(
+            self.strip.mesh, 1.0
+        )  # below 1 on the way to a fast flow
+        self._convection_form = self.convection_share * convection(velocity, v, m)
         self._convection = dolfinx.fem.form(self._convection_form)
         self._jacobian_form = stokes + ufl.derivative(self._convection_form, self.state)
         self._force = _vector(self._convection)
@@ -158,6 +175,8 @@ class FlowProblem:
         own = self.space.dofmap.index_map.size_local
         self._own = own
         self._own_fixed = self._fixed[self._fixed < own]
+        faces = np.unique(self._facet_dofs)
+        self._own_faces = faces[faces < own]
 
     def release(self) -> None:
         """Give the factors' memory back; they are made anew when needed again. Collective."""
@@ -213,30 +232,25 @@ class FlowProblem:
         solver.solve(rhs, self._work)
         self._adopt(self._work)
 
-    def steady_residual(
-        self, motion: StepMotion, convective: PETSc.Vec | None = None
-    ) -> tuple[PETSc.Vec, float]:
-        """K x + N - f of the steady equations at the present state, and the size of f with the ports' share in it.
+    def steady_residual(self, motion: StepMotion, convective: PETSc.Vec | None = None) -> PETSc.Vec:
+        """K x + N - f of the steady equations at the present state; the same vector at every call.
 
         N is the convective force of the state unless another one is given, as the mean of a cycle is.
         """
-        force = self._rhs
-        force.set(0.0)
-        force.axpy(motion.bed_velocity, self.entrainment)
-        force.axpy(motion.acceleration, self.acceleration)
-        scale = force.copy()
-        self._prescribe(scale, "steady", motion.frame_velocity_y)
-        size = scale.norm()
-        scale.destroy()
         residual = self._work
         self.steady_matrix.mult(self.vector, residual)
         residual.axpy(1.0, self.convective_force() if convective is None else convective)
-        residual.axpy(-1.0, force)
+        residual.axpy(-motion.bed_velocity, self.entrainment)
+        residual.axpy(-motion.acceleration, self.acceleration)
         residual.array[self._own_fixed] = 0.0
-        return residual, size
+        return residual
 
-    def newton_update(self, residual: PETSc.Vec) -> None:
-        """Subtract J^-1 residual from the state; J includes the derivative of the convection. Raises ConvergenceError."""
+    def newton_update(self, residual: PETSc.Vec, exact: bool = False) -> float:
+        """Subtract J^-1 residual from the state; returns the largest change of a velocity over the largest velocity.
+
+        J includes the derivative of the convection. Its system is solved by GMRES with the factor of the steady operator as
+        preconditioner, to 1e-4 of the residual; `exact` makes a factor of J itself. Raises ConvergenceError.
+        """
         if self._jacobian is None:
             self._jacobian = dolfinx.fem.form(self._jacobian_form)
         # the convection's derivative couples the same facets: copying the pattern spares building it, the peak of memory
@@ -244,6 +258,27 @@ class FlowProblem:
         dolfinx.fem.petsc.assemble_matrix(matrix, self._jacobian)
         matrix.assemble()
         matrix.zeroRowsColumns(self._own_fixed + matrix.getOwnershipRange()[0], 1.0)
+        if exact:
+            solver = DirectSolver(matrix, "flow (Newton)")
+            solver.solve(residual, self._fix)
+            solver.destroy()
+        else:
+            self._precondition(matrix, residual)
+            matrix.destroy()
+        self.state.x.array[: self._own] -= self._fix.array
+        self.state.x.scatter_forward()
+        faces, weights = self._own_faces, self._weights[self._own_faces]
+        change, fastest = largest(
+            self.strip.comm,
+            [
+                np.abs(values[faces] / weights).max(initial=0.0)
+                for values in (self._fix.array, self.state.x.array)
+            ],
+        )
+        return float(change / fastest) if fastest > 0.0 else 0.0
+
+    def _precondition(self, matrix: PETSc.Mat, residual: PETSc.Vec) -> None:
+        """Solve matrix x = residual into `_fix` with the factor of the steady operator."""
         stokes = self._solver("steady")
         ksp = PETSc.KSP().create(matrix.comm)
         # on the right, which fgmres is too; but gmres keeps half the vectors, and this preconditioner does not change
@@ -254,13 +289,12 @@ class FlowProblem:
         ksp.setPC(stokes.ksp.getPC())
         ksp.setOperators(matrix, stokes.matrix)
         ksp.setGMRESRestart(30)
-        ksp.solve(residual, self._fix)
-        check(ksp, "flow (Newton)")
-        self.state.x.array[: self._own] -= self._fix.array
-        self.state.x.scatter_forward()
-        stokes.ksp.setOperators(stokes.matrix)
-        ksp.destroy()
-        matrix.destroy()
+        try:
+            ksp.solve(residual, self._fix)
+            check(ksp, "flow (Newton)")
+        finally:
+            stokes.ksp.setOperators(stokes.matrix)
+            ksp.destroy()
 
     def _prescribe(self, rhs: PETSc.Vec, kind: str, frame_velocity_y: float) -> None:
         """Move the prescribed unknowns to the right-hand side."""

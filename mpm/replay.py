@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.courant import check_bounded
-from mpm.cycle import FlowField, mean_field, mean_motion, periodic_flow, steady_flow
+from mpm.cycle import mean_field, mean_motion, periodic_flow
 from mpm.flow import FlowProblem, face_flow
 from mpm.motion import BedMotion, step_motion
 from mpm.schedule import RESTING, Schedule, Step
+from mpm.steadyflow import FlowField, steady_flow
 from mpm.strip import Strip
 from mpm.transport import Transport
 

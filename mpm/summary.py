@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mpm.cycle import FlowField
 from mpm.diagnostics import (
     State,
     Totals,
@@ -25,6 +24,7 @@ from mpm.flow import boundary_flows, face_flow
 from mpm.fronts import backflow, contamination, cvd_totals, film, fronts
 from mpm.geometry import Grid
 from mpm.parallel import total
+from mpm.steadyflow import FlowField
 from mpm.versions import versions
 
 if TYPE_CHECKING:

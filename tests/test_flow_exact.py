@@ -7,10 +7,11 @@ import pytest
 import sympy as sp
 
 from mpm.case import Case
-from mpm.cycle import cycle_motions, periodic_flow, steady_flow
+from mpm.cycle import cycle_motions, periodic_flow
 from mpm.flow import FlowProblem, boundary_flows, face_flow
 from mpm.motion import REST, BedMotion, StepMotion
 from mpm.parallel import largest
+from mpm.steadyflow import steady_flow
 from mpm.strip import BOTTOM, LEFT, TOP, Strip
 
 from .cases import MPI, TINY, column_case, norm, rate, strip_case, zone
@@ -45,6 +46,13 @@ def profile(p: FlowProblem) -> np.ndarray:
     return u[:, 0]
 
 
+def volume_flux(p: FlowProblem, v_s: float) -> np.ndarray:
+    """U = u_x + (1 - eps) v_s per row [m/s]: what gas and solids carry together while the bed moves with `v_s`."""
+    layers = [p.case.geometry.layers[i] for i in p.strip.grid.row_layer]
+    solids = [1.0 - l.material.porosity if l.moving and l.material else 0.0 for l in layers]
+    return profile(p) + v_s * np.array(solids)
+
+
 def centres(p: FlowProblem) -> np.ndarray:
     y = p.strip.grid.y
     return 0.5 * (y[1:] + y[:-1])
@@ -71,9 +79,9 @@ def test_poiseuille() -> None:
 
 
 def brinkman(mu: float, mu_e: float, k: float, h: float, height: float, g: float, drag: float) -> Any:
-    """u(y) of a gas layer 0 < y < H over a porous one -h < y < 0 with walls at rest; `drag` is eps v_s.
+    """U(y) of a gas layer 0 < y < H over a porous one -h < y < 0 with walls at rest; `drag` is v_s.
 
-    gas: mu u'' + G = 0; porous: mu_e u'' - (mu/K)(u - eps v_s) + G = 0; u and mu u' continuous.
+    gas: mu U'' + G = 0; porous: mu_e U'' - (mu/K)(U - v_s) + G = 0; U = u + (1-eps) v_s and mu U' continuous.
     """
     l, far, e = np.sqrt(mu / (mu_e * k)), drag + g * k / mu, np.exp(-np.sqrt(mu / (mu_e * k)) * h)
     matrix = [[e, 1, 0, 0], [1, e, -1, 0], [mu_e * l, -mu_e * l * e, 0, -mu], [0, 0, 1, height]]
@@ -87,7 +95,7 @@ def brinkman(mu: float, mu_e: float, k: float, h: float, height: float, g: float
     return u
 
 
-# name: (mu_e/mu, K, G, eps v_s) with mu = H = 1, h = 1/2, and u at y = -1/4, 0, 1/2 from brinkman_steady.csv of the reference numbers
+# name: (mu_e/mu, K, G, v_s) with mu = H = 1, h = 1/2, and U at y = -1/4, 0, 1/2 from brinkman_steady.csv of the reference numbers
 STEADY = {
     "porous layer at rest": ((1.0, 1e-2, 1.0, 0.0), (1.280639671e-02, 5.441927409e-02, 1.522096370e-01)),
     "effective viscosity mu/eps": (
@@ -112,7 +120,8 @@ def test_brinkman_solution() -> None:
 
 @pytest.mark.parametrize("name", STEADY)
 def test_gas_over_a_porous_layer(name: str) -> None:
-    """Fails when drag, effective viscosity, interface or the entrainment eps v_s are wrong, or converge below second order.
+    """Fails when drag, effective viscosity or interface are wrong, when it is not the total volume flux U that is continuous across the
+    face of a moving layer and dragged towards v_s, or when they converge below second order.
 
     Rows are graded towards the interface where the layer is tight (sqrt(K) is a hundredth of the gas layer).
     """
@@ -132,26 +141,75 @@ def test_gas_over_a_porous_layer(name: str) -> None:
             viscosity_ratio=ratio,
         ).with_({"geometry.layer.gas.grading": 1 / grading, "geometry.layer.bed.grading": grading})
         p = problem(case)
-        steady_flow(p, StepMotion(drag / eps, -force, 0.0, 0.0))
+        steady_flow(p, StepMotion(drag, -force, 0.0, 0.0))
         y, weights = centres(p), p.strip.grid.dy
         exact = brinkman(1.0, ratio, k, 0.5, 1.0, force, drag)(y)
-        errors.append(norm(profile(p) - exact, weights) / np.abs(exact).max())
+        errors.append(norm(volume_flux(p, drag) - exact, weights) / np.abs(exact).max())
     assert errors[-1] < 2e-3, errors
     assert rate([1 / n for n in cells], errors) > 1.85, errors
 
 
 def test_bed_of_the_thesis_drags_the_gas_above_it() -> None:
-    """Fails when gas over a moving bed is not carried at eps v_s = 1.3 cm/s in the bed and linearly to rest at the roof.
+    """Fails when gas at the surface of the bed does not move with the solids, v_s = 1.3 cm/s, and linearly to rest at the roof: Couette
+    flow of mean v_s/2. The gas in the bed is carried at eps v_s.
 
     sqrt(K) = 2 um is far below the rows here, as in every reactor mesh; reference: thesis_bed_drag in brinkman_steady.csv.
     """
-    case = layered(20, 6, 1e-2, 3e-3, mu=1.72e-5, rho=0.7217, porosity=0.46, permeability="4.25 um^2")
+    v_s, eps = 0.013, 0.46
+    case = layered(20, 6, 1e-2, 3e-3, mu=1.72e-5, rho=0.7217, porosity=eps, permeability="4.25 um^2")
     p = problem(case)
-    steady_flow(p, StepMotion(0.013 / 0.46, 0.0, 0.0, 0.0))
+    steady_flow(p, StepMotion(v_s, 0.0, 0.0, 0.0))
     u, y = profile(p), centres(p)
-    np.testing.assert_allclose(u[1:5], 0.013, rtol=1e-3)
+    np.testing.assert_allclose(u[1:5], eps * v_s, rtol=1e-4)
     table = np.interp(y[6:], np.linspace(0, 1e-2, 11), [1.299732053e-02 * (1 - i / 10) for i in range(11)])
-    np.testing.assert_allclose(u[6:], table, atol=2e-4 * 0.013)
+    np.testing.assert_allclose(u[6:], table, atol=1e-5 * v_s)
+    assert u[6:].mean() == pytest.approx(0.5 * v_s, rel=3e-4)  # the table's surface lags by sqrt(K)/H
+
+
+@pytest.mark.parallel
+def test_a_strip_in_which_everything_moves_equals_one_at_rest() -> None:
+    """Fails when the flow depends on the frame of the observer: with all solids moving at v, every velocity gains v and nothing else.
+
+    A lining, gas, a plate, a bed and gas again under a second lining; gas seeps through all of them and is driven along them, so that
+    drag, shear, inertia and all interfaces count. The walls stay at rest: the outermost rows of the linings shield them.
+    """
+    speed, porosities = 0.02, {"lining": 0.5, "plate": 0.37, "bed": 0.46}
+    layers = [
+        {"name": "floor", "height": "2 mm", "cells": 5, "material": "lining"},
+        {"name": "plenum", "height": "4 mm", "cells": 6},
+        {"name": "plate", "height": "1.6 mm", "cells": 3, "material": "plate"},
+        {"name": "bed", "height": "3 mm", "cells": 4, "material": "bed", "moving": True},
+        {"name": "headspace", "height": "8 mm", "cells": 9},
+        {"name": "roof", "height": "2 mm", "cells": 5, "material": "lining"},
+    ]
+    port = {"center": "1.5 mm", "width": "3 mm"}
+    case = strip_case(
+        layers,
+        geometry={
+            "inlet": [{"name": "in", "velocity": "3 cm/s", **port}],
+            "outlet": [{"name": "out", **port}],
+        },
+        material={
+            name: {"porosity": eps, "permeability": "4 um^2", "surface_to_volume": "0 1/m"}
+            for name, eps in porosities.items()
+        },
+    )
+    for layer in case.geometry.layers:  # a case has one moving layer at most; the equations do not mind
+        object.__setattr__(layer, "moving", layer.material_name is not None)
+    p = problem(case, comm=COMM)
+    fields = [steady_flow(p, StepMotion(v, -0.05, 0.0, 0.0)) for v in (0.0, speed)]
+    rest, moving = (f.velocities[:, : p.strip.owned] for f in fields)
+    solids = np.array([porosities.get(l.material_name or "", 1.0) for l in case.geometry.layers])
+    gained = speed * solids[p.strip.grid.row_layer][p.strip.row[: p.strip.owned]]
+    inside = np.isin(p.strip.grid.layer_names, ["floor", "roof"], invert=True)
+    inside = inside[p.strip.grid.row_layer][p.strip.row[: p.strip.owned]]
+    np.testing.assert_allclose(
+        (moving[LEFT] - rest[LEFT] - gained)[inside], 0.0, atol=1e-7 * speed, err_msg="u_x"
+    )
+    np.testing.assert_allclose(moving[TOP], rest[TOP], atol=1e-9 * speed)
+    assert (
+        largest(COMM, [np.abs(rest[LEFT]).max(initial=0.0)])[0] > 0.3 * speed
+    )  # gas at rest would prove nothing
 
 
 # --- oscillating frame and bed ---
@@ -169,13 +227,15 @@ def oscillating(
     drag: complex,
     acceleration: complex,
 ) -> Any:
-    """Amplitude of u relative to the frame, u = Re[U e^{iwt}], walls at rest in it, frame acceleration Re[a e^{iwt}].
+    """Amplitude of u relative to the frame, Re[u e^{iwt}], walls at rest in it, frame acceleration Re[a e^{iwt}]; `drag` is v_s.
 
-    gas: i w rho U = mu U'' - rho a; porous: (i w rho/eps + mu/K) U = mu_e U'' + (mu/K) eps v_s - rho a. Without a layer: h = 0.
+    With U = u + (1-eps) v_s in the layer, which is continuous: gas i w rho U = mu U'' - rho a; porous (i w rho/eps + mu/K) U =
+    mu_e U'' + (mu/K + i w (rho/eps) (1-eps)) v_s - rho a. Without a layer: h = 0.
     """
     in_gas, forced = np.sqrt(1j * w * rho / mu), -acceleration / (1j * w)
     in_bed = np.sqrt((mu / k + 1j * w * rho / eps) / mu_e)
-    carried = (mu / k * drag - rho * acceleration) / (mu / k + 1j * w * rho / eps)
+    pulled = mu / k * drag + 1j * w * rho / eps * (1.0 - eps) * drag
+    carried = (pulled - rho * acceleration) / (mu / k + 1j * w * rho / eps)
     e, eg = np.exp(-in_bed * h), np.exp(-in_gas * height)
     matrix = [
         [e, 1, 0, 0],
@@ -191,7 +251,7 @@ def oscillating(
 
     def u(y: np.ndarray) -> np.ndarray:
         below, above = np.minimum(y, 0.0), np.maximum(y, 0.0)
-        porous = carried + a * np.exp(in_bed * below) + b * np.exp(-in_bed * (below + h))
+        porous = carried + a * np.exp(in_bed * below) + b * np.exp(-in_bed * (below + h)) - (1.0 - eps) * drag
         gas = forced + c * np.exp(-in_gas * above) + d * np.exp(in_gas * (above - height))
         return np.where((y >= 0.0) | (h == 0.0), gas, porous)
 
@@ -203,9 +263,10 @@ def test_oscillating_solution() -> None:
     y, mu, rho, w, k, eps, mu_e, q = sp.symbols("y mu rho w K eps mu_e q", positive=True)
     d, a = sp.symbols("d a")
     l = sp.sqrt((mu / k + sp.I * w * rho / eps) / mu_e)
-    carried = (mu / k * d - rho * a) / (mu / k + sp.I * w * rho / eps)
-    u = carried + q * sp.exp(l * y)
-    residual = (sp.I * w * rho / eps + mu / k) * u - mu_e * sp.diff(u, y, 2) - mu / k * d + rho * a
+    pulled = mu / k * d + sp.I * w * rho / eps * (1 - eps) * d
+    whole = (pulled - rho * a) / (mu / k + sp.I * w * rho / eps) + q * sp.exp(l * y)
+    u = whole - (1 - eps) * d
+    residual = sp.I * w * rho / eps * u - mu_e * sp.diff(whole, y, 2) + mu / k * (whole - d) + rho * a
     assert sp.simplify(residual) == 0
     height = np.linspace(0.0, 3.0, 7)
     amplitude = oscillating(0.5, 0.5, 1.0, 1.0, 1.0, 0.0, 40.0, 1.0, 0.0, 1j)
@@ -295,7 +356,7 @@ def test_oscillating_bed_and_frame() -> None:
     """Fails when a bed that swings relative to an accelerated frame drives gas and pore gas with wrong size or phase; order h^2 + dt."""
     mu, rho, w, eps, k, h, height, ratio = 0.5, 1.0, 1.0, 0.46, 0.1, 1.0, 3.0, 1.3
     slip, acceleration = 0.8 - 0.3j, 1j * w
-    exact = oscillating(mu, ratio * mu, rho, eps, k, h, height, w, eps * slip, acceleration)
+    exact = oscillating(mu, ratio * mu, rho, eps, k, h, height, w, slip, acceleration)
     errors, levels = [], [(12, 4, 8), (24, 8, 32), (48, 16, 128)]
     for gas_cells, bed_cells, steps in levels:
         case = layered(
@@ -471,3 +532,26 @@ def test_every_field_of_the_cycle_is_free_of_divergence(frame: str) -> None:
         bottom = field.velocities[BOTTOM][strip.wall_cells("bottom")]
         lowest = min(lowest, -largest(COMM, [-bottom.min(initial=0.0)])[0])
     assert (lowest < -1e-3) == (frame == "lab")
+
+
+@pytest.mark.parametrize("permeability", [4.6e-14, 1e-15, 1e-17])
+def test_gas_seeps_through_a_bed_of_fine_powder(permeability: float) -> None:
+    """Fails when creeping flow through a tight layer is not found, or does not cost mu u h/K: it is linear and has always a solution."""
+    case = zone({"material.glass_beads.permeability": f"{permeability!r} m^2", "gas.viscosity": "1.72e-5 Pa s"}, TINY)
+    reactor = Reactor(case, MPI.COMM_SELF)
+    p = FlowProblem(case, reactor.strip, 1.0)
+    mean = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
+    seeping = 2.0 * 0.035 * 4e-3 / 139.7e-3
+    drops = pressure_drops(case, reactor.strip, mean)
+    assert drops["bed"] == pytest.approx(1.72e-5 * seeping * 3e-3 / permeability, rel=1e-6)
+    assert p.divergence() < 1e-10
+
+
+def test_fast_ports_find_their_steady_flow() -> None:
+    """Fails when the steady flow of ports at 1 m/s (Reynolds number 168) is not found, or is not where the marched equations rest."""
+    fast = {f"geometry.inlet.{name}.velocity": "1 m/s" for name in ("purge", "tma")}
+    p = problem(zone({**fast, "gas.viscosity": "1.72e-5 Pa s"}), 1e-5)
+    before = steady_flow(p).velocities.copy()
+    for _ in range(3):
+        p.step(REST)
+    assert np.abs(p.velocities() - before).max() < 1e-6 * np.abs(before).max()

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from mpm import fem  # noqa: F401  (fem first: it loads the finite-element stack)
 from mpm.case import Case
-from mpm.cycle import FlowField, cycle_motions, periodic_flow, steady_flow
+from mpm.cycle import cycle_motions, periodic_flow
 from mpm.flow import FaceFlow, FlowProblem
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, StepMotion, step_motion
 from mpm.replay import March
 from mpm.schedule import Schedule
+from mpm.steadyflow import FlowField, steady_flow
 from mpm.strip import Strip
 from reproduction.store import Arrays, Lab
 
