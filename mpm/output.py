@@ -6,6 +6,7 @@
 | `fields.pvd`, `fields/fields_000000.vtu` ... | all fields on one grid, one file per output time |
 | `history.csv` | one row per output time, first column `time` |
 | `summary.json` | the numbers of the finished run, SI units |
+| `flux.csv` | gas velocity through the upper face of every layer along x, mean of a cycle |
 | `checkpoint.npz` | restart state |
 | `run.log`, `plots/*.png` | log; pictures |
 
@@ -33,7 +34,15 @@ from mpm.files import write_atomically
 if TYPE_CHECKING:
     from mpm.geometry import Grid
 
-OWN_FILES = ("case.toml", "fields.pvd", "history.csv", "summary.json", "checkpoint.npz", "run.log")
+OWN_FILES = (
+    "case.toml",
+    "fields.pvd",
+    "history.csv",
+    "summary.json",
+    "flux.csv",
+    "checkpoint.npz",
+    "run.log",
+)
 OWN_PATTERNS = ("fields/fields_*.vtu", "plots/*.png", "*.tmp", "fields/*.tmp", "plots/*.tmp")
 META = "__meta__"
 
@@ -178,6 +187,14 @@ class RunDirectory:
         """Write `summary.json`: None is dropped; a number that is not finite is an error (MpmError)."""
         text = json.dumps(plain(summary, "summary.json"), indent=2, allow_nan=False)
         write_atomically(self.path / "summary.json", text + "\n", sync=True)
+
+    def write_flux(self, profiles: Mapping[str, NDArray[np.float64]]) -> None:
+        """Write `flux.csv`, columns of equal length (`mpm.flownumbers.flux_profiles`)."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(profiles)
+        writer.writerows(zip(*(map(repr, map(float, column)) for column in profiles.values()), strict=True))
+        write_atomically(self.path / "flux.csv", text.getvalue())
 
     def read_summary(self) -> dict[str, Any] | None:
         """Contents of `summary.json`, None when there is none."""

@@ -22,6 +22,7 @@ from mpm.check import check_case
 from mpm.diagnostics import State, Totals, total_concentration
 from mpm.dispersion import vibrational_dispersion
 from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
+from mpm.flownumbers import flux_profiles
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
 from mpm.output import RunDirectory
@@ -128,8 +129,7 @@ class Reactor:
                 self._give_up(directory, error)
                 raise
         summary = summarise(self, "done", self.wall)
-        if directory is not None:
-            on_root(self.comm, lambda: directory.write_summary(summary))
+        self._write_numbers(directory, summary)
         return Result(self, summary)
 
     @property
@@ -219,8 +219,7 @@ class Reactor:
         status = "done" if error is None else "interrupted" if isinstance(error, Interrupted) else "failed"
         self._write(directory, callback if error is None else None, None)
         summary = summarise(self, status, self.wall)
-        if directory is not None:
-            on_root(self.comm, lambda: directory.write_summary(summary))
+        self._write_numbers(directory, summary)
         if error is not None:
             raise error
         return Result(self, summary)
@@ -321,8 +320,19 @@ class Reactor:
         log.error("%s", error)
         if worst_balance(self.case, self.totals())[1] <= LIMIT:
             checkpoint.write(self, directory)
-        summary = summarise(self, status, self.wall)
-        on_root(self.comm, lambda: directory.write_summary(summary))
+        self._write_numbers(directory, summarise(self, status, self.wall))
+
+    def _write_numbers(self, directory: RunDirectory | None, summary: dict[str, Any]) -> None:
+        """Write the summary, and the flux of the mean flow along the strip."""
+        if directory is None or self.flows is None:
+            return
+        profiles = flux_profiles(self.strip, self.flows.mean())
+
+        def write() -> None:
+            directory.write_flux(profiles)
+            directory.write_summary(summary)
+
+        on_root(self.comm, write)
 
     # --- looking ---
 

@@ -17,7 +17,7 @@ from mpm.motion import REST, StepMotion
 
 Floats = NDArray[np.float64]
 CONVERGED = 1e-8  # last change of a velocity, relative to the fastest; the next one would be smaller by 1e-4 or better
-# change that is accepted once it no longer shrinks: what the rounding of the pressure leaves, 1e-8 where a powder of a micron holds back 1 bar
+# change that is accepted once it no longer shrinks: what rounding of the pressure leaves, 1e-8 where a powder of a micron holds back 1 bar
 ROUNDING = 1e-5
 LIMIT = 15  # Newton steps from a creeping flow
 SHARE_LIMIT = 12  # and from a flow with less convection

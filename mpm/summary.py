@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from mpm.diagnostics import (
     State,
     Totals,
@@ -20,11 +18,9 @@ from mpm.diagnostics import (
     utilisation,
 )
 from mpm.engineering import inlet_excess
-from mpm.flow import boundary_flows, face_flow
+from mpm.flownumbers import flow_numbers
 from mpm.fronts import backflow, contamination, cvd_totals, film, fronts
 from mpm.geometry import Grid
-from mpm.parallel import total
-from mpm.steadyflow import FlowField
 from mpm.versions import versions
 
 if TYPE_CHECKING:
@@ -63,7 +59,7 @@ def summarise(reactor: Reactor, status: str, wall: float) -> dict[str, Any]:
         "film": nested(reactor.numbers, "film") or film(case, grid, totals, None),
     }
     if reactor.flows is not None:
-        summary["flow"] = flow_numbers(reactor, reactor.flows.mean())
+        summary["flow"] = flow_numbers(case, reactor.strip, reactor.flows.mean())
     return {key: value for key, value in summary.items() if value != {}}
 
 
@@ -93,39 +89,3 @@ def history_row(
         },
     }
     return flatten(tree)
-
-
-def flow_numbers(reactor: Reactor, mean: FlowField) -> dict[str, Any]:
-    """Cycle means: volume flows through inlets and outlets [m2/s], their mismatch over the inflow, gas velocity in the moving layer
-    [m/s], pressure drops [Pa] (mean of the row below the layer minus that above, so that both interfaces are inside)."""
-    case, strip, grid = reactor.case, reactor.strip, reactor.grid
-    flows = boundary_flows(case, strip, face_flow(strip, mean.velocities))
-    inflow = sum(flows[i.name] for i in case.geometry.inlets)
-    outflow = -sum(flows[o.name] for o in case.geometry.outlets)
-    numbers: dict[str, Any] = {"inflow": inflow, "outflow": outflow}
-    if inflow:
-        numbers["mass_error"] = abs(inflow - outflow) / abs(inflow)
-    own = strip.owned
-    bottom, left, right, top = mean.velocities[:, :own]
-    row = strip.row[:own]
-    pressure = total(strip.comm, np.bincount(row, mean.pressure[:own], grid.rows)) / grid.columns
-    moving = case.geometry.moving_layer
-    if moving is not None:
-        rows = grid.layer_rows(moving.name)
-        inside = (row >= rows.start) & (row < rows.stop)
-        weights = strip.volume[:own][inside]
-        sums = total(
-            strip.comm,
-            [
-                (0.5 * (left + right))[inside] @ weights,
-                (0.5 * (bottom + top))[inside] @ weights,
-                weights.sum(),
-            ],
-        )
-        numbers["bed_superficial_velocity"] = [float(sums[0] / sums[2]), float(sums[1] / sums[2])]
-    for layer in case.geometry.layers:
-        rows = grid.layer_rows(layer.name)
-        if layer.material is not None and rows.start > 0 and rows.stop < grid.rows:
-            name = "bed_pressure_drop" if layer.moving else "frit_pressure_drop"
-            numbers.setdefault(name, float(pressure[rows.start - 1] - pressure[rows.stop]))
-    return numbers

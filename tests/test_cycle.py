@@ -30,7 +30,7 @@ def run(**changes: Any) -> Result:
 
 def test_stoichiometric_doses_and_a_delay_keep_cvd_low() -> None:
     """At the port width that makes the pair 2e-4/7.5e-5 saturating (2.2 mm, TMA dose ratio 0.98): a tenth of the CVD of Y = 1e-3/1e-3
-    or less, a start-up spike without delay, none with 15 s.
+    or less, a start-up spike without delay, a tenth of it with 15 s.
 
     Fails when the CVD rate does not follow the doses, when a delayed inlet doses too early, or when a balance opens; sites on the
     solids that enter, leave and stay count in the balance of the elements. Film grows by half a formula unit per site that passes.
@@ -46,8 +46,7 @@ def test_stoichiometric_doses_and_a_delay_keep_cvd_low() -> None:
         > 0.0
     )
     assert rates["plain"].max() > 1.5 * rates["plain"][-1]
-    assert rates["delayed"].max() < 1.2 * rates["delayed"][-1]
-    assert rates["delayed"].max() < 0.5 * rates["plain"].max()
+    assert rates["delayed"].max() < 0.2 * rates["plain"].max()
     assert np.all(rates["delayed"][delayed.history["time"] <= 15.0] == 0.0)
     for result in (plain, rich, delayed):
         summary = result.summary

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mpm.case import Case
+from mpm.case import Case, load_case
 from mpm.cycle import cycle_motions, periodic_flow
 from mpm.flow import FlowProblem, boundary_flows, face_flow
+from mpm.flownumbers import flow_numbers, flux_profiles, pressure_drops
 from mpm.motion import REST, BedMotion, StepMotion
 from mpm.parallel import largest
 from mpm.steadyflow import steady_flow
@@ -537,12 +538,13 @@ def test_every_field_of_the_cycle_is_free_of_divergence(frame: str) -> None:
 @pytest.mark.parametrize("permeability", [4.6e-14, 1e-15, 1e-17])
 def test_gas_seeps_through_a_bed_of_fine_powder(permeability: float) -> None:
     """Fails when creeping flow through a tight layer is not found, or does not cost mu u h/K: it is linear and has always a solution."""
-    case = zone({"material.glass_beads.permeability": f"{permeability!r} m^2", "gas.viscosity": "1.72e-5 Pa s"}, TINY)
-    reactor = Reactor(case, MPI.COMM_SELF)
-    p = FlowProblem(case, reactor.strip, 1.0)
+    case = zone(
+        {"material.glass_beads.permeability": f"{permeability!r} m^2", "gas.viscosity": "1.72e-5 Pa s"}, TINY
+    )
+    p = problem(case)
     mean = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
     seeping = 2.0 * 0.035 * 4e-3 / 139.7e-3
-    drops = pressure_drops(case, reactor.strip, mean)
+    drops = pressure_drops(case, p.strip, mean)
     assert drops["bed"] == pytest.approx(1.72e-5 * seeping * 3e-3 / permeability, rel=1e-6)
     assert p.divergence() < 1e-10
 
@@ -555,3 +557,47 @@ def test_fast_ports_find_their_steady_flow() -> None:
     for _ in range(3):
         p.step(REST)
     assert np.abs(p.velocities() - before).max() < 1e-6 * np.abs(before).max()
+
+
+@pytest.mark.parallel
+@pytest.mark.parametrize("frit_cells", [1, 3, 12])
+@pytest.mark.parametrize("frit", ["2.76 um^2", "0.2 um^2"])
+def test_pressure_drops_are_between_the_faces_of_a_layer(frit: str, frit_cells: int) -> None:
+    """Fails when a layer's pressure drop depends on the rows or the permeability of its neighbours: Darcy gives mu u h/K for each."""
+    changes = {
+        "geometry.layer.frit.cells": frit_cells,
+        "material.sintered_powder.permeability": frit,
+        "gas.viscosity": "1.72e-5 Pa s",
+    }
+    case = zone(changes)
+    p = problem(case, comm=COMM)
+    mean = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
+    numbers = flow_numbers(case, p.strip, mean)
+    seeping = 2.0 * 0.035 * 4e-3 / 139.7e-3
+    assert numbers["bed_pressure_drop"] == pytest.approx(1.72e-5 * seeping * 3e-3 / 4.25e-12, rel=1e-4)
+    expected = 1.72e-5 * seeping * 1.59e-3 / (float(frit.split()[0]) * 1e-12)
+    assert numbers["frit_pressure_drop"] == pytest.approx(expected, rel=1e-4)
+    assert numbers["pressure_drop"] == {
+        "frit": numbers["frit_pressure_drop"],
+        "bed": numbers["bed_pressure_drop"],
+    }
+
+
+@pytest.mark.parallel
+def test_flow_of_each_outlet_and_flux_through_the_frit() -> None:
+    """Fails when the flow of a single outlet is not reported, or the flux through a layer's face does not add up to what passes it."""
+    outlets = [
+        {"name": "near", "center": "60 mm", "width": "9 mm"},
+        {"name": "far", "center": "104.8 mm", "width": "20 mm"},
+    ]
+    data = zone().to_dict()
+    data["geometry"]["outlet"] = outlets
+    case = load_case(data)
+    p = problem(case, comm=COMM)
+    mean = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
+    numbers, flux = flow_numbers(case, p.strip, mean), flux_profiles(p.strip, mean)
+    assert set(numbers["outlets"]) == {"near", "far"} and min(numbers["outlets"].values()) > 0.0
+    assert sum(numbers["outlets"].values()) == pytest.approx(numbers["inflow"], rel=1e-10)
+    assert list(flux) == ["x", "velocity_y.plenum", "velocity_y.frit", "velocity_y.bed"]
+    for name in list(flux)[1:]:
+        assert flux[name].sum() * p.strip.grid.dx == pytest.approx(numbers["inflow"], rel=1e-10)
