@@ -163,8 +163,11 @@ def plot(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the dire
         return
     from mpm.plot import plot_run
 
-    for path in plot_run(directory):
+    paths = plot_run(directory, lambda line: print(line, file=sys.stderr))
+    for path in paths:
         print(path)
+    if not paths:
+        print(f"{directory}: no output yet, nothing to draw", file=sys.stderr)
 
 
 @app.command()

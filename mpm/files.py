@@ -2,6 +2,7 @@
 
 import codecs
 import os
+import re
 from pathlib import Path
 
 _OTHER_MARKS = {
@@ -46,3 +47,8 @@ def write_atomically(path: str | os.PathLike[str], content: bytes | str, *, sync
             stream.flush()
             os.fsync(stream.fileno())
     os.replace(temporary, path)
+
+
+def file_name(text: str) -> str:
+    """`text` as part of a file's name: what is no letter, digit or one of ._()+- becomes %XX, so that different texts stay apart."""
+    return re.sub(r"[^\w.()+-]", lambda found: f"%{ord(found[0]):02X}", text)

@@ -29,9 +29,14 @@ LINE = 8.5
 MM = 1e3
 
 
+def literal(text: str) -> str:
+    """`text` as matplotlib shows it letter by letter: a dollar sign begins no formula."""
+    return text.replace("$", r"\$")
+
+
 def formula(name: str) -> str:
     """A chemical formula with its numbers as subscripts; other names unchanged."""
-    return re.sub(r"(?<=[A-Za-z)])(\d+)", r"$_{\1}$", name)
+    return re.sub(r"(?<=[A-Za-z)])(\d+)", r"$_{\1}$", literal(name))
 
 
 def coverage_figure(run: Run, snapshot: Snapshot, site: str) -> Figure:
@@ -82,7 +87,7 @@ def map_figure(
     scale = "to scale" if stretch == 1 else f"height stretched {stretch} times"
     title = run.case.title or run.directory.path.resolve().name
     when = "steady state" if run.case.fidelity == "steady" else f"t = {snapshot.time:.4g} s"
-    strip.set_title(f"{title}, {when} ({scale})", pad=22 + LINE, fontsize=10)
+    strip.set_title(f"{literal(title)}, {when} ({scale})", pad=22 + LINE, fontsize=10)
     strip.set_facecolor("#f2f2f2")
     draw_layers(strip, run.case, grid, height * stretch)
     draw_ports(strip, run.case)
@@ -95,7 +100,7 @@ def map_figure(
             grid.x * MM, y, values[rows], cmap=colours, norm=norm, shading="flat", rasterized=True
         )
         draw_zones(panel, run.case)
-        panel.set_ylabel(f"{name}: y [mm]")
+        panel.set_ylabel(f"{literal(name)}: y [mm]")
     for panel in axes:
         panel.set_xlim(grid.x[0] * MM, grid.x[-1] * MM)
     axes[-1].set_xlabel(
@@ -134,7 +139,7 @@ def draw_layers(axes: Axes, case: Case, grid: Grid, inches: float) -> None:
         made_of = f" ({layer.material_name.replace('_', ' ')})" if layer.material_name else ""
         text = layer.name + made_of
         axes.annotate(
-            text,
+            literal(text),
             (1.008, at),
             xycoords=("axes fraction", "data"),
             va="center",
@@ -189,7 +194,7 @@ def draw_port(axes: Axes, text: str, x0: float, x1: float, side: str, colour: st
     )  # fmt: skip
     offset = (5 if way > 0 else 17) + line * LINE  # at the bottom below the tick labels
     axes.annotate(
-        text, (0.5 * (x0 + x1) * MM, at), xycoords=transform, xytext=(0, way * offset),
+        literal(text), (0.5 * (x0 + x1) * MM, at), xycoords=transform, xytext=(0, way * offset),
         textcoords="offset points", ha="center", va="bottom" if way > 0 else "top", fontsize=7.5, color=colour,
     )  # fmt: skip
 

@@ -14,8 +14,10 @@ The colours are those of Okabe and Ito (2008) and matplotlib's cividis and virid
 
 from __future__ import annotations
 
+import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
@@ -27,10 +29,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mpm.diagnostics import exit_column
-from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, species_figure
+from mpm.errors import InputError
+from mpm.files import file_name
+from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, literal, species_figure
 from mpm.results import Run, dosing_inlets, fed_species, load_run, made_sites, sites_made_by
+from mpm.vtu import Snapshot
 
 Floats = NDArray[np.float64]
+log = logging.getLogger("mpm")
 
 STYLE = {
     "font.size": 9,
@@ -43,35 +49,93 @@ STYLE = {
 }
 
 
-def plot_run(directory: str | Path) -> list[Path]:
-    """Draw all pictures that the files of a run allow, into its `plots/`; returns their paths."""
-    run = load_run(directory)
-    run.directory.plots.mkdir(exist_ok=True)
+def plot_run(directory: str | Path, say: Callable[[str], None] = log.warning) -> list[Path]:
+    """Draw all pictures that the files of a run allow, into its `plots/`; returns their paths.
+
+    What is missing or damaged is told to `say`, a sentence each. Raises InputError when `directory` is no run's, `plots/` cannot be
+    written, or nothing can be drawn of what is left.
+    """
+    troubles: list[str] = []
+
+    def note(trouble: str) -> None:
+        troubles.append(trouble)
+        say(trouble)
+
+    run = load_run(directory, note)
+    try:
+        run.directory.plots.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{run.directory.plots}: pictures cannot be written here ({error.strerror})"
+        ) from None
     paths = []
     with style.context(STYLE):
-        for name, figure in figures(run):
+        for name, figure in figures(run, note):
             paths.append(run.directory.plots / f"{name}.png")
             figure.savefig(paths[-1])
+    if troubles and not paths:
+        raise InputError(f"{run.directory.path}: no picture can be drawn of what is there")
     return paths
 
 
-def figures(run: Run) -> Iterator[tuple[str, Figure]]:
-    """Name and figure of every picture; a run without stored fields, or with a single output time, has fewer."""
-    if run.times:
-        snapshot = run.snapshot()
+class Fields:
+    """The stored fields of a run, without those that cannot be read; `lost` says why, by index."""
+
+    def __init__(self, run: Run):
+        self.run = run
+        self.lost: dict[int, str] = {}
+
+    def at(self, indices: Iterable[int]) -> Iterator[Snapshot]:
+        """The readable ones of these."""
+        for index in indices:
+            try:
+                yield self.run.snapshot(index)
+            except InputError as error:
+                self.lost[index] = str(error)
+
+    def last(self) -> Snapshot | None:
+        return next(self.at(range(len(self.run.times) - 1, -1, -1)), None)
+
+
+def figures(run: Run, say: Callable[[str], None] = log.warning) -> Iterator[tuple[str, Figure]]:
+    """Name (of its file) and figure of every picture; a run without stored fields, or with a single output time, has fewer.
+
+    A picture that cannot be drawn is named to `say` with the reason.
+    """
+    fields = Fields(run)
+    for name, draw in pictures(run, fields, say):
+        try:
+            yield file_name(name), draw()
+        except InputError as error:
+            say(f"{name}: not drawn: {error}")
+    if fields.lost:
+        first, *more = fields.lost.values()
+        say(first + (f" (and {len(more)} more files of fields)" if more else ""))
+
+
+def pictures(
+    run: Run, fields: Fields, say: Callable[[str], None]
+) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """What there is to draw, and how."""
+    if not run.times and any(run.directory.path.glob("fields/*.vtu")):
+        say(f"{run.directory.pvd}: missing or damaged, no maps without it")
+    snapshot = fields.last()
+    if snapshot is not None:
         for site in made_sites(run.case):
             name = "coverage" if site == made_sites(run.case)[0] else f"coverage_{site}"
-            yield name, coverage_figure(run, snapshot, site)
+            yield name, partial(coverage_figure, run, snapshot, site)
         for species in fed_species(run.case):
-            yield f"map_{species}", species_figure(run, snapshot, species)
+            yield f"map_{species}", partial(species_figure, run, snapshot, species)
         if np.any(snapshot.cell_data.get("cvd_rate", np.zeros(1))):
-            yield "map_cvd", cvd_figure(run, snapshot)
+            yield "map_cvd", partial(cvd_figure, run, snapshot)
         if exits(run):
-            yield "exit_profile", exit_profile_figure(run)
+            yield "exit_profile", partial(exit_profile_figure, run, fields)
     if len(run.history.get("time", ())) > 1:
-        yield "history", history_figure(run)
+        yield "history", partial(history_figure, run)
         if any(outlet_species(run, outlet.name) for outlet in run.case.geometry.outlets):
-            yield "outlets", outlets_figure(run)
+            yield "outlets", partial(outlets_figure, run)
+    elif len(run.times) > 1:
+        say(f"{run.directory.path / 'history.csv'}: missing or empty, no curves over time without it")
 
 
 def history_figure(run: Run) -> Figure:
@@ -93,7 +157,7 @@ def history_figure(run: Run) -> Figure:
                 _, rest = key.split(".", 1)
                 inlet, kind = rest.rsplit(".", 1)
                 colour = OKABE_ITO[inlets.index(inlet) % len(OKABE_ITO)]
-                text = f"{inlet}: {kind.replace('_', ' ')}"
+                text = f"{literal(inlet)}: {kind.replace('_', ' ')}"
                 panel.plot(time, values, dashes[kind], color=colour, label=text)
             else:
                 plot_log(panel, time, np.abs(values), formula(key.split(".", 1)[1]))
@@ -121,7 +185,7 @@ def outlets_figure(run: Run) -> Figure:
         for one, values in outlet_species(run, name).items():
             colour = OKABE_ITO[list(species).index(one) % len(OKABE_ITO)]
             plot_log(panel, run.history["time"], values, formula(one), colour)
-        panel.set_title(f"outlet {name}", fontsize=9)
+        panel.set_title(literal(f"outlet {name}"), fontsize=9)
         panel.grid(alpha=0.25)
     if largest > 0.0:
         axes[0, 0].set_ylim(largest * 1e-6, largest * 3.0)
@@ -162,7 +226,7 @@ def exits(run: Run) -> list[tuple[str, str, tuple[str, ...], int]]:
     return found
 
 
-def exit_profile_figure(run: Run, count: int = 5) -> Figure:
+def exit_profile_figure(run: Run, fields: Fields, count: int = 5) -> Figure:
     """Coverage over height where solids leave each dosing zone, at up to `count` output times."""
     shown = exits(run)
     rows = run.grid.layer_rows(next(layer.name for layer in run.case.geometry.layers if layer.moving))
@@ -173,13 +237,12 @@ def exit_profile_figure(run: Run, count: int = 5) -> Figure:
     figure = Figure(figsize=(1.6 + 2.9 * columns, 0.2 + 3.0 * lines), layout="constrained")
     axes = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     shades = mpl.colormaps["cividis_r"](np.linspace(0.15, 1.0, len(steps)))
-    for step, colour in zip(steps, shades, strict=True):
-        snapshot = run.snapshot(int(step))
+    for snapshot, colour in zip(fields.at(steps.tolist()), shades, strict=False):
         for panel, (_, _, sites, column) in zip(axes.flat, shown, strict=False):
             theta = np.sum([run.field(snapshot, f"theta_{site}")[rows, column] for site in sites], axis=0)
             panel.plot(theta, y, "o-", markersize=3, color=colour, label=f"{snapshot.time:.4g} s")
     for panel, (zone, inlet, sites, _) in zip(axes.flat, shown, strict=False):
-        panel.set_title(f"exit of zone {zone} (inlet {inlet})", fontsize=9)
+        panel.set_title(literal(f"exit of zone {zone} (inlet {inlet})"), fontsize=9)
         panel.set_xlabel(f"coverage of {', '.join(formula(site) for site in sites)}")
         panel.set_xlim(-0.03, 1.03)
         panel.grid(alpha=0.25)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import struct
+import zlib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.case import Case, load_case
-from mpm.errors import InputError
+from mpm.errors import InputError, MpmError
 from mpm.geometry import Grid
 from mpm.output import RunDirectory
 from mpm.vtu import Snapshot
@@ -31,14 +33,28 @@ class Run:
     grid: Grid
     history: Mapping[str, Floats]
     summary: Mapping[str, Any]
+    steps: Sequence[tuple[float, str]]
+    """Time [s] and file of the stored fields."""
 
     @property
     def times(self) -> list[float]:
         """Times of the stored fields [s]."""
-        return [time for time, _ in self.directory.steps]
+        return [time for time, _ in self.steps]
 
     def snapshot(self, index: int = -1) -> Snapshot:
-        return self.directory.read_fields(index)
+        """One of the stored fields. Raises InputError when its file is missing, cut, or of another mesh."""
+        file = self.directory.path / self.steps[index][1]
+        try:
+            found = self.directory.read_fields(index)
+        except OSError as error:
+            raise InputError(f"{file}: {error.strerror}") from None
+        except (MpmError, ValueError, KeyError, struct.error, zlib.error) as error:
+            raise InputError(f"{file}: damaged ({error})") from None
+        if len(found.quads) != self.grid.cells:
+            raise InputError(
+                f"{file}: found {len(found.quads)} cells; accepted: the {self.grid.cells} of case.toml"
+            )
+        return found
 
     def field(self, snapshot: Snapshot, name: str) -> Floats:
         """A cell field as (rows, columns), bottom row first."""
@@ -48,14 +64,45 @@ class Run:
         return snapshot.cell_data[name].astype(float).reshape(self.grid.rows, self.grid.columns)
 
 
-def load_run(directory: str | Path) -> Run:
-    """Read a run's directory. Raises InputError when it is not one."""
+def load_run(directory: str | Path, say: Callable[[str], None] | None = None) -> Run:
+    """Read a run's directory. Raises InputError when it is not one, or a file in it is damaged.
+
+    With `say`, a damaged file that the rest can do without is named to it and counts as missing.
+    """
     path = Path(directory)
-    if not (path / "case.toml").exists():
-        raise InputError(f"{path}: not the directory of a run (it has no case.toml)")
+    if not (path / "case.toml").is_file():
+        raise InputError.at(path, "", what_it_is(path), "the directory of a run, with its case.toml")
+    if any(path.glob("seed_*")):
+        raise InputError.at(
+            path, "", "what `mpm dem` wrote, with pictures in plots/", "the directory of a run"
+        )
     files = RunDirectory(path)
     case = load_case(path / "case.toml")
-    return Run(files, case, Grid.from_case(case), files.history(), files.read_summary() or {})
+
+    def unless_damaged[T](read: Callable[[], T], otherwise: T) -> T:
+        try:
+            return read()
+        except (MpmError, OSError, ValueError) as error:
+            if say is None:
+                raise
+            say(str(error))
+            return otherwise
+
+    history: dict[str, Floats] = unless_damaged(files.history, {})
+    summary = unless_damaged(files.read_summary, None) or {}
+    steps: list[tuple[float, str]] = unless_damaged(lambda: files.steps, [])
+    return Run(files, case, Grid.from_case(case), history, summary, steps)
+
+
+def what_it_is(path: Path) -> str:
+    """A directory without case.toml, in words."""
+    if not path.exists():
+        return "no such directory"
+    if not path.is_dir():
+        return "a file"
+    if (path / "sweep.json").exists() or (path / "driver").is_dir():
+        return "a sweep, with pictures in plots/ and its runs in points/"
+    return "a directory without case.toml"
 
 
 def fed_by(inlet: Inlet, species: Sequence[str]) -> list[str]:

@@ -14,10 +14,11 @@ from matplotlib.image import imread
 
 from mpm.case import Case, load_case
 from mpm.errors import InputError
+from mpm.files import file_name
 from mpm.geometry import Grid
 from mpm.maps import WIDTH, coverage_figure, cvd_figure, formula, species_figure, spread
 from mpm.output import RunDirectory
-from mpm.plot import exit_profile_figure, figures, history_figure, outlets_figure, plot_run
+from mpm.plot import Fields, exit_profile_figure, figures, history_figure, outlets_figure, plot_run
 from mpm.results import Run, dosing_inlets, fed_species, load_run, sites_made_by
 
 SITE = "OAl(CH3)2"
@@ -189,7 +190,7 @@ def test_outlet_curves(cycle: Run) -> None:
 
 def test_exit_profile_is_the_last_column_of_the_zone(cycle: Run) -> None:
     """Fails when another column, row order, time or site is drawn."""
-    figure = exit_profile_figure(cycle)
+    figure = exit_profile_figure(cycle, Fields(cycle))
     grid = cycle.grid
     rows = grid.layer_rows("bed")
     y = 0.5 * (grid.y[1:] + grid.y[:-1])[rows] * 1e3
@@ -262,3 +263,109 @@ def test_missing_field_names_those_that_exist(zone: Run) -> None:
     """Fails when the message does not say what could have been asked for."""
     with pytest.raises(InputError, match=r"x_CO.*x_TMA"):
         species_figure(zone, zone.snapshot(), "CO")
+
+
+def pictures_of(path: Path) -> tuple[set[str], str]:
+    """Names of the pictures that can be drawn, and everything that was said."""
+    said: list[str] = []
+    return {name for name, _ in figures(load_run(path, said.append), said.append)}, "\n".join(said)
+
+
+ALL = {"coverage", "map_TMA", "map_cvd", "exit_profile", "history", "outlets"}
+
+
+@pytest.mark.parametrize(
+    ("lost", "missing"),
+    [
+        ("fields/fields_000002.vtu", set()),
+        ("fields/fields_000008.vtu", set()),
+        ("fields.pvd", ALL - {"history", "outlets"}),
+        ("history.csv", {"history", "outlets"}),
+        ("summary.json", set()),
+    ],
+)
+@pytest.mark.parametrize("how", ["removed", "cut", "garbage", "empty", "a directory"])
+def test_an_incomplete_copy_gives_the_pictures_that_are_left(
+    zone: Run, lost: str, missing: set[str], how: str
+) -> None:
+    """Fails when one lost or damaged file costs more pictures than need it, goes unsaid, or ends in a traceback."""
+    file = zone.directory.path / lost
+    content = file.read_bytes()
+    file.unlink()
+    if how == "a directory":
+        file.mkdir()
+    elif how != "removed":
+        file.write_bytes(
+            {"cut": content[: len(content) // 2], "garbage": b"\xff\x00?" * 99, "empty": b""}[how]
+        )
+    drawn_names, said = pictures_of(zone.directory.path)
+    if how == "cut" and lost == "history.csv":
+        missing = set()  # its whole rows are drawn
+    assert ALL - drawn_names == missing
+    assert file.name in said or lost == "summary.json" or (how, lost) == ("cut", "history.csv")
+
+
+def test_a_run_of_which_nothing_is_left_is_one_line(zone: Run) -> None:
+    """Fails when a copy without any output file ends as if pictures had been drawn, or the last readable fields are not used."""
+    fields = sorted((zone.directory.path / "fields").iterdir())
+    for file in fields[1:]:
+        file.unlink()
+    drawn_names, said = pictures_of(zone.directory.path)
+    assert drawn_names == ALL and "(and 7 more files of fields)" in said
+    assert figure_times(zone) == {"0 s"}
+    fields[0].unlink()
+    (zone.directory.path / "history.csv").unlink()
+    with pytest.raises(InputError, match="no picture can be drawn"):
+        plot_run(zone.directory.path, lambda line: None)
+
+
+def figure_times(run: Run) -> set[str]:
+    """Times that the exit profile shows."""
+    figure = exit_profile_figure(run, Fields(run))
+    return {str(line.get_label()) for line in figure.axes[0].get_lines()}
+
+
+def test_fields_of_another_mesh_are_not_drawn(zone: Run, tmp_path: Path) -> None:
+    """Fails when a case.toml of another mesh beside the fields ends in a traceback or in a picture."""
+    other = load_case("single_zone", {"geometry.cell_width": "3 mm"})
+    zone.directory.write_case(other.to_toml())
+    drawn_names, said = pictures_of(zone.directory.path)
+    assert drawn_names == {"history", "outlets"} and "cells; accepted" in said
+
+
+@pytest.mark.parametrize("what", ["nothing", "file", "empty", "sweep", "dem"])
+def test_what_is_no_run_is_refused_by_what_it_is(tmp_path: Path, what: str) -> None:
+    """Fails when `mpm plot` of something else ends in a traceback or does not say what it was given."""
+    path = tmp_path / "x"
+    if what == "file":
+        path.write_text("")
+    elif what != "nothing":
+        path.mkdir()
+    if what == "sweep":
+        (path / "sweep.json").write_text("{}")
+    if what == "dem":
+        (path / "case.toml").write_text('powder = "GL50"')
+        (path / "seed_1").mkdir()
+    words = {
+        "nothing": "no such",
+        "file": "a file",
+        "empty": "without case.toml",
+        "sweep": "points/",
+        "dem": "mpm dem",
+    }
+    with pytest.raises(InputError, match=words[what]):
+        load_run(path)
+
+
+def test_names_are_no_formulas_and_no_paths(tmp_path: Path) -> None:
+    """Fails when a dollar sign in a title or a name begins a formula of matplotlib, or a name with a slash leaves plots/."""
+    changes = {"geometry.cell_width": "2 mm", "title": r"5 $ and \frac $ more"}
+    figure = coverage_figure(
+        run := write_run(tmp_path / "x", load_case("single_zone", changes), TIMES[:2]), run.snapshot(), SITE
+    )
+    figure.draw_without_rendering()
+    assert r"5 \$ and" in figure.axes[0].get_title()
+    assert (
+        file_name("map_../a b") == "map_..%2Fa%20b"
+        and file_name("coverage_OAl(CH3)2") == "coverage_OAl(CH3)2"
+    )
