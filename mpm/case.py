@@ -302,6 +302,12 @@ class Case(Frozen):
 
     def _check_chemistry(self) -> None:
         species, sites = self._mechanism.species_names, self._mechanism.site_names
+        if "." in self.gas.carrier:
+            raise reject(
+                repr(self.gas.carrier),
+                "a name without dots: results name mole fractions by it",
+                key="gas.carrier",
+            )
         if self.gas.carrier in species:
             raise reject(
                 f"carrier {self.gas.carrier!r}, a species of the mechanism",

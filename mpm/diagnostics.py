@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from mpm.case import Case, Inlet, Zone
 
 Floats = NDArray[np.float64]
+NO_FLOW = 1e-12
+"""Share of the strip's volume that counts as nothing, per output (steady: per second); ports at 1 nm/s let out 1e-9 of it."""
 FLOOR = 1e-6  # of the run's largest feed: balances of smaller amounts are measured against this
 
 
@@ -69,12 +71,12 @@ def species_balances(case: Case, totals: Totals) -> dict[str, dict[str, float]]:
     """Per species: fed + produced = left + reacted + stored [mol/m].
 
     `left` is what went out minus what an outlet drew back in, `stored` final minus initial, in the gas. `balance_error` is the residual
-    over the largest of these terms, or over 1e-6 of the run's largest feed when all are smaller. A species that nothing can bring about
-    has zeros.
+    over the largest of these terms, or over 1e-6 of the run's largest feed (of the sites on the solids when nothing has been fed) when all
+    are smaller. A species that nothing can bring about has zeros.
     """
     mechanism = case.mechanism
     events = {"surface": totals.surface.sum(axis=(1, 2)), "gas": totals.gas.sum(axis=1)}
-    largest = float(totals.fed.sum(axis=0).max(initial=0.0))
+    largest = float(totals.fed.sum(axis=0).max(initial=0.0)) or float(totals.sites_initially.sum())
     result = {}
     for name in mechanism.species_names:
         if name not in totals.names:
@@ -140,7 +142,8 @@ def site_balance(case: Case, totals: Totals) -> float:
 def element_balances(case: Case, totals: Totals) -> dict[str, float]:
     """Per element: what came in with gas and solids = what left with them + what is stored in the gas, on surfaces and in the film.
 
-    The carrier takes no part. Relative to the largest of these terms, or to 1e-6 of the atoms on the solids when all are smaller.
+    The carrier takes no part. Relative to the largest of these terms, or to 1e-6 of the atoms on the solids (of the sites when nothing has
+    been fed) when all are smaller.
     """
     mechanism = case.mechanism
     errors = {}
@@ -173,6 +176,8 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
             s.elements.get(element, 0.0) * n
             for s, n in zip(mechanism.sites, totals.sites_initially, strict=True)
         )
+        if not totals.fed.any():
+            on_solids = max(on_solids, totals.sites_initially.sum())
         scale = max(FLOOR * float(on_solids), *(abs(t) for t in terms))
         errors[element] = abs(sum(terms)) / scale if scale else 0.0
     return errors
@@ -275,13 +280,14 @@ def outlet_fractions(
 ) -> dict[str, dict[str, dict[str, float]]]:
     """Flux-weighted mole fractions of what left each outlet since `before` (the previous output; None: since the start).
 
-    Amount of the species over amount of gas (volume times p/(R T)); the carrier by difference. Gas drawn back in does not count.
+    Amount of the species over amount of gas (volume times p/(R T)); the carrier by difference. Gas drawn back in does not count. An
+    outlet that has let out nothing (`let_out`) has none.
     """
     molar_density = total_concentration(case)
     result = {}
     for k, outlet in enumerate(case.geometry.outlets):
-        volume = totals.out_volume[k] - (before.out_volume[k] if before else 0.0)
-        if volume <= 0.0:
+        volume = let_out(case, totals, before, k)
+        if volume is None:
             continue
         amounts = totals.out[k] - (before.out[k] if before else 0.0)
         fractions = dict.fromkeys(case.mechanism.species_names, 0.0)
@@ -290,6 +296,13 @@ def outlet_fractions(
         fractions[case.gas.carrier] = 1.0 - sum(fractions.values())
         result[outlet.name] = {"x": fractions}
     return result
+
+
+def let_out(case: Case, totals: Totals, before: Totals | None, outlet: int) -> float | None:
+    """Volume [m2] that has left through an outlet since `before`; None where it is below NO_FLOW of the strip: rounding of no flow."""
+    volume = float(totals.out_volume[outlet] - (before.out_volume[outlet] if before else 0.0))
+    strip = case.geometry.length * sum(layer.height for layer in case.geometry.layers)
+    return volume if volume > NO_FLOW * strip else None
 
 
 def total_concentration(case: Case) -> float:

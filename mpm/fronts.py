@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from mpm.chemistry import inlet_concentrations
 from mpm.diagnostics import (
+    FLOOR,
     State,
     Totals,
     conveyed_layer,
     dosed_species,
+    let_out,
     running_gas,
     running_surface,
     titrated,
@@ -74,7 +76,8 @@ def front(grid: Grid, profile: Floats, feed: float, center: float, along: int = 
     """Fronts of a concentration profile (columns,) around an inlet at `center` [m] that feeds `feed` [mol/m3]; solids go `along` +x or -x.
 
     `upstream`, `downstream`: distance [m] from the inlet's centreline against and along the conveying direction at which the
-    profile falls to half the feed; `upstream_width`: distance between 90 and 10 % of its largest value, upstream of that value.
+    profile falls to half the feed; `upstream_width`: distance between 90 and 10 % of its largest value, upstream of that value, where that
+    is at least FLOOR of the feed: less is no front but the far end of one.
     """
     result: dict[str, float] = {}
     for name, direction in (("upstream", -along), ("downstream", along)):
@@ -83,7 +86,7 @@ def front(grid: Grid, profile: Floats, feed: float, center: float, along: int = 
         if at is not None:
             result[name] = at
     top = int(np.argmax(profile))
-    if profile[top] > 0.0:
+    if profile[top] > FLOOR * feed:
         distance, columns = walk(grid, grid.x[top] + 0.5 * grid.dx, -along)
         values = profile[columns] / profile[top]
         high, low = crossing(distance, values, 0.9), crossing(distance, values, 0.1)
@@ -220,9 +223,9 @@ def backflow(case: Case, totals: Totals, before: Totals | None) -> dict[str, dic
     """Per outlet: volume drawn back in over volume let out since `before` (None: since the start). A one-way outlet has 0."""
     result = {}
     for k, outlet in enumerate(case.geometry.outlets):
-        out = totals.out_volume[k] - (before.out_volume[k] if before else 0.0)
+        out = let_out(case, totals, before, k)
         back = totals.back_volume[k] - (before.back_volume[k] if before else 0.0)
-        if out > 0.0:
+        if out is not None:
             result[outlet.name] = {"backflow": float(back / out)}
     return result
 

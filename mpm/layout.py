@@ -41,6 +41,10 @@ from mpm.units import (
     worked_out,
 )
 
+WALLS = ("left", "right", "bottom_wall", "top_wall")
+"""Physical groups of a mesh file beside layers and ports. Readers such as meshio know a group by its name alone."""
+RESERVED_LAYERS = ("height",)
+"""Names beside those of layers under `front.INLET` in the results."""
 MOST_CELLS = 100_000_000
 """A mesh beyond this is a slip of the unit, not a plan."""
 
@@ -248,6 +252,7 @@ class Geometry(Frozen):
         _check_names("layer", self.layers)
         _check_names("port", (*self.inlets, *self.outlets))
         _check_names("zone", self.zones)
+        _check_reserved(self.layers, (*self.inlets, *self.outlets))
         moving = [layer.name for layer in self.layers if layer.moving]
         if len(moving) > 1:
             raise reject(
@@ -368,6 +373,26 @@ def _check_inside(key: str, start: float, end: float, length: float) -> None:
     tolerance = 1e-9 * length
     if start < -tolerance or end > length + tolerance:
         raise reject(_span(start, end), f"a stretch inside the strip, 0 mm to {length * 1e3:g} mm", key=key)
+
+
+def _check_reserved(layers: Sequence[Layer], ports: Sequence[_Port]) -> None:
+    """Names that mean something else where a mesh file or a table of results says them."""
+    for layer in layers:
+        if layer.name in RESERVED_LAYERS:
+            raise reject(
+                f"{layer.name!r}, which front.INLET.{layer.name} of the results names already",
+                "another name",
+                key=f"layer.{layer.name}.name",
+            )
+    names = [layer.name for layer in layers]
+    for port in ports:
+        if port.name in (*WALLS, *names):
+            kind = "wall" if port.name in WALLS else "layer"
+            raise reject(
+                f"{port.name!r}, the name of a {kind} in mesh files",
+                f"a name that no wall ({', '.join(WALLS)}) and no layer ({', '.join(names)}) has",
+                key=f"{_kind(port)}.{port.name}.name",
+            )
 
 
 def _check_names(kind: str, entries: Iterable[Layer | Inlet | Outlet | Zone]) -> None:

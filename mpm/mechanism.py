@@ -170,6 +170,14 @@ def write_equation(left: Mapping[str, float], right: Mapping[str, float]) -> str
     return f"{side(left)} -> {side(right)}"
 
 
+RESERVED_SPECIES = {
+    "default": "gas.diffusivity",
+    "sites": "balance.sites of history.csv",
+    "cvd": "map_cvd.png",
+}
+"""Names that a species would share with another entry of the case or the results, and where."""
+
+
 def build_mechanism(chemistry: Chemistry) -> Mechanism:
     """Assemble and check the mechanism of a complete `[chemistry]` table.
 
@@ -191,6 +199,12 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
     seen: set[str] = set()
     for kind, names in (("species", species), ("site", sites), ("film", films)):
         for name in names:
+            if kind == "species" and name in RESERVED_SPECIES:
+                raise reject(
+                    f"{name!r}, which means something else in {RESERVED_SPECIES[name]}",
+                    "another name; formula = ... says what it is made of",
+                    key=f"chemistry.species.{name}",
+                )
             if name in seen or "." in name:
                 raise reject(
                     f"{name!r}",
@@ -226,6 +240,13 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
 
 def _elements(kind: str, name: str, table: SpeciesTable | SiteTable) -> dict[str, float]:
     if table.elements is not None:
+        for element in table.elements:
+            if not element.isalnum():
+                raise reject(
+                    repr(element),
+                    "symbols of elements, e.g. elements = { Al = 1, C = 3, H = 9 }",
+                    key=f"chemistry.{kind}.{name}.elements",
+                )
         return dict(table.elements)
     try:
         return parse_formula(table.formula or name)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mpm.errors import InputError
 from mpm.geometry import Grid
+from mpm.layout import WALLS
 
 if TYPE_CHECKING:
     from mpm.case import Case
@@ -207,7 +208,7 @@ def _in_grid_order(
     ports = {
         name: np.unique(np.searchsorted(grid.x, points[nodes].mean(axis=1)[:, 0]) - 1)
         for name, nodes in lines.items()
-        if name not in ("left", "right", "bottom_wall", "top_wall")
+        if name not in WALLS
     }
     return QuadMesh(points[used], compact.reshape(cells.shape), layer, names, ports)
 

@@ -218,6 +218,32 @@ BROKEN: dict[str, tuple[Edits, str, str]] = {
     ),
     "unknown carrier": (swap('"N2"', '"N3"'), "gas.carrier", "one of N2, Ar, He"),
     "carrier that reacts": (swap('"N2"', '"H2O"\nmolar_mass = "18 g/mol"'), "gas.carrier", "takes no part"),
+    "carrier with a dot": (swap('"N2"', '"N2 5.0"\nmolar_mass = "28 g/mol"'), "gas.carrier", "without dots"),
+    "port named like a wall of the mesh": (
+        swap('name = "purge"', 'name = "left"'),
+        "geometry.inlet.left.name",
+        "the name of a wall in mesh files",
+    ),
+    "port named like a layer": (
+        swap('name = "purge"', 'name = "frit"'),
+        "geometry.inlet.frit.name",
+        "the name of a layer in mesh files",
+    ),
+    "layer named like a number of the results": (
+        swap('name = "plenum"', 'name = "height"'),
+        "geometry.layer.height.name",
+        "front.INLET.height",
+    ),
+    "species named like another balance": (
+        swap(ALUMINA, ALUMINA + '[chemistry.species.sites]\nmolar_mass = "18 g/mol"\nformula = "H2O"\n'),
+        "chemistry.species.sites",
+        "balance.sites",
+    ),
+    "element with a dot": (
+        swap(ALUMINA, ALUMINA + '[chemistry.species.X]\nmolar_mass = "18 g/mol"\nelements = { "A.b" = 1 }\n'),
+        "chemistry.species.X.elements",
+        "symbols of elements",
+    ),
     "temperature below zero": (swap('"473 K"', '"-300 degC"'), "gas.temperature", "above 0 K"),
     "diffusivity of an unknown species": (
         swap('"2.88e-5 m^2/s"', '{ TMA = "2e-5 m^2/s", Xe = "1e-5 m^2/s" }'),

@@ -54,6 +54,7 @@ def test_front_of_a_ramp(grid: Grid) -> None:
     assert found["upstream"] == pytest.approx(0.5 * reach, rel=0.05)
     assert found["upstream_width"] == pytest.approx(0.8 * reach, rel=0.05)
     assert "downstream" not in front(grid, np.full(grid.columns, feed), feed, center)
+    assert front(grid, 1e-9 * profile, feed, center) == {}  # the far end of a front has no width of its own
 
 
 @pytest.mark.parametrize("place", [0.06, 0.12])
