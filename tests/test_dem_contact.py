@@ -239,3 +239,20 @@ def test_explosion_is_named(tmp_path):
     ):
         box.run(400_000)
     assert "\n" not in str(info.value) and "steps_per_collision" in str(info.value)
+
+
+@pytest.mark.parametrize("x", [-1e-22, -0.0, 1.0, 1.0 - 1e-16, -3.0, 5.0 - 1e-15])
+def test_a_particle_on_the_seam_is_in_the_box(tmp_path, x):
+    """x in box lengths: its remainder rounds onto the box's size. Fails when engine or search refuse it, or its contact is lost."""
+    from mpm.dem.sampling import count_contacts, wrapped
+
+    size = 10 * D
+    for axis in (0, 1):
+        position = np.full((2, 3), 5 * D)
+        position[:, axis] = x * size, 0.9 * D
+        with make(tmp_path, position) as box:
+            state = box.snapshot()
+            assert count_contacts(box.spec, state)[0] == 1
+        np.testing.assert_allclose(state.position, position, atol=1e-12 * D)
+        inside = wrapped(position, np.array([size, size]))[:, :2]
+        assert (inside >= 0.0).all() and (inside < size).all()

@@ -16,6 +16,7 @@ import pytest
 
 from mpm.cli import main
 from mpm.dem.case import load_case
+from mpm.dem.run import last_words, process_log
 
 TINY = """
 title = "test"
@@ -258,3 +259,53 @@ def test_interrupted_run_goes_on(tiny, tmp_path):
     done = int(max(state(out, s)["cycles"] for s in (1, 2)))
     assert main([*command[3:], "--resume", "--set", f"run.cycles={max(done, 2)}"]) == 0
     assert json.loads((out / "summary.json").read_text())["status"] == "done"
+
+
+CRASH = """
+import ctypes, json, queue, sys
+from pathlib import Path
+import mpm.dem.run as run
+
+class Simulation:
+    def __init__(self, *_): pass
+    def run(self, *_):
+        print("ERROR on proc 0: Molecule count changed (src/x.cpp:1)", flush=True)
+        if sys.argv[2] == "segfault":
+            ctypes.string_at(0)
+        raise ValueError("Some input data are greater than the size of the periodic box.")
+
+run.Simulation = Simulation
+messages = queue.SimpleQueue()
+run._work(Path(sys.argv[1]), 1, False, messages)
+Path(sys.argv[1]).with_name("message").write_text(json.dumps(messages.get()))
+"""
+
+
+@pytest.mark.parametrize("how", ["exception", "segfault"])
+def test_a_seed_that_crashes_leaves_its_last_words(tiny, how):
+    """Fails when the cause of a crash in a process of its own is missing in its log or in the line that tells of it."""
+    done = subprocess.run([sys.executable, "-c", CRASH, str(tiny), how], capture_output=True, text=True)
+    log = process_log(tiny.parent, 1)
+    text = log.read_text()
+    assert "Molecule count changed" in text and not done.stdout and not done.stderr
+    if how == "segfault":
+        assert done.returncode == -signal.SIGSEGV
+        assert "Segmentation fault" in text
+        assert "was killed by SIGSEGV" in last_words(log, done.returncode) and str(log) in last_words(
+            log, -11
+        )
+    else:
+        seed, kind, content = json.loads((tiny.parent / "message").read_text())
+        assert (seed, kind) == (1, "crashed") and content.startswith("ValueError: Some input data")
+        assert "Traceback" in text
+
+
+def test_how_a_process_ended_is_said_in_words(tmp_path):
+    """Fails when an exit code or a signal is not told, or a log without text is quoted."""
+    assert (
+        last_words(tmp_path / "none", -9)
+        == "its process was killed by SIGKILL (out of memory?) and without a word"
+    )
+    (tmp_path / "log").write_text("first\nAbort(1): no room\n\n")
+    words = last_words(tmp_path / "log", 1)
+    assert words == f"its process ended with exit code 1: Abort(1): no room (see {tmp_path / 'log'})"

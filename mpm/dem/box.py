@@ -155,7 +155,8 @@ class Box:
         size = np.array([spec.length, spec.depth])
         turns = np.floor(particles.position[:, :2] / size).astype(int)
         wrapped = particles.position.copy()
-        wrapped[:, :2] -= turns * size
+        # rounding must not put a particle onto the upper face, which belongs to the box's other side, or below the lower
+        wrapped[:, :2] = np.clip(wrapped[:, :2] - turns * size, 0.0, np.nextafter(size, 0.0))
         images = [self.lmp.encode_image_flags(int(i), int(j), 0) for i, j in turns]
         position = np.concatenate([wrapped, base.positions])
         types = np.concatenate([particles.classes + 1, np.full(len(base.positions), frit_type)])

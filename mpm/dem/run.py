@@ -1,10 +1,13 @@
 """All seeds of a powder file: side by side in processes, or over groups of MPI ranks; then the report."""
 
+import faulthandler
 import multiprocessing
+import os
 import queue
 import shutil
 import signal
 import time
+import traceback
 from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
@@ -130,8 +133,13 @@ def finish(case: DemCase, directory: Path, seconds: float, workers: int) -> dict
 # Several seeds at a time -------------------------------------------------------------------------------
 
 
+def process_log(directory: Path, seed: int) -> Path:
+    """What a seed's own process printed: LAMMPS' last words, a traceback, the stack of a crash. Removed when it is empty."""
+    return seed_directory(directory, seed) / "process.log"
+
+
 def _work(toml_path: Path, seed: int, resume: bool, messages: Any) -> None:
-    """One seed in its own process; reports progress and the outcome through the queue."""
+    """One seed in its own process; reports progress and the outcome through the queue, prints into its log."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
     last = 0.0
 
@@ -142,12 +150,41 @@ def _work(toml_path: Path, seed: int, resume: bool, messages: Any) -> None:
             messages.put((seed, "cycles", done))
 
     try:
-        case = load_case(toml_path)
-        Simulation(case, seed, seed_directory(toml_path.parent, seed)).run(resume, progress)
+        directory = seed_directory(toml_path.parent, seed)
+        directory.mkdir(parents=True, exist_ok=True)
+        with open(process_log(toml_path.parent, seed), "w", encoding="utf-8") as log:
+            for number in (1, 2):
+                os.dup2(log.fileno(), number)
+            faulthandler.enable(log)
+            try:
+                Simulation(load_case(toml_path), seed, directory).run(resume, progress)
+            except (InputError, ConvergenceError):
+                raise
+            except Exception:
+                traceback.print_exc(file=log)
+                raise
+            finally:
+                faulthandler.disable()
     except (InputError, ConvergenceError) as error:
         messages.put((seed, "failed", error))
+    except Exception as error:
+        messages.put((seed, "crashed", f"{type(error).__name__}: {error}"))
     else:
         messages.put((seed, "done", None))
+
+
+def last_words(log: Path, exit_code: int | None) -> str:
+    """How a process ended that could not say so itself, with the last line of its log."""
+    how = f"ended with exit code {exit_code}"
+    if exit_code is not None and exit_code < 0:
+        how = f"was killed by {signal.Signals(-exit_code).name}"
+        if -exit_code == signal.SIGKILL:
+            how += " (out of memory?)"
+    text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+    lines = [line for line in text.splitlines() if line.strip()]
+    return f"its process {how}" + (
+        f": {lines[-1].strip()[:200]} (see {log})" if lines else " and without a word"
+    )
 
 
 def _side_by_side(case: DemCase, directory: Path, jobs: int, resume: bool, report: Report) -> None:
@@ -155,6 +192,9 @@ def _side_by_side(case: DemCase, directory: Path, jobs: int, resume: bool, repor
     messages = context.Queue()
     waiting = list(case.run.seeds)
     active: dict[int, Any] = {}
+    ended: dict[
+        int, float
+    ] = {}  # when a process was first seen to have ended: its last message may be under way
     try:
         while waiting or active:
             while waiting and len(active) < jobs:
@@ -163,22 +203,31 @@ def _side_by_side(case: DemCase, directory: Path, jobs: int, resume: bool, repor
                     target=_work, args=(directory / "case.toml", seed, resume, messages), daemon=True
                 )
                 active[seed].start()
+            for seed, process in active.items():
+                if (
+                    not process.is_alive()
+                    and time.monotonic() > ended.setdefault(seed, time.monotonic()) + 2.0
+                ):
+                    words = last_words(process_log(directory, seed), process.exitcode)
+                    raise ConvergenceError(f"seed {seed}: {words}")
             try:
                 seed, kind, content = messages.get(timeout=0.5)
             except queue.Empty:
-                for seed, process in active.items():
-                    if not process.is_alive() and messages.empty():
-                        raise ConvergenceError(
-                            f"seed {seed}: its process ended without a word (exit code {process.exitcode})"
-                        ) from None
                 continue
             if kind == "cycles":
                 report(seed, content)
             elif kind == "failed":
                 raise type(content)(f"seed {seed}: {content}")
+            elif kind == "crashed":
+                raise ConvergenceError(
+                    f"seed {seed}: {content} (traceback in {process_log(directory, seed)})"
+                )
             else:
                 report(seed, float(case.run.cycles))
                 active.pop(seed).join()
+                log = process_log(directory, seed)
+                if log.exists() and not log.stat().st_size:
+                    log.unlink()
     finally:
         for process in active.values():
             process.terminate()

@@ -14,11 +14,22 @@ BIN = 0.5  # height of a bin of the maps, in mean diameters
 GAP_RANKS = (0.05, 0.20)  # ranks in height of the particles whose rise measures the gap
 
 
+def wrapped(position: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """`position` (n, 3) with x and y in [0, size), size (2,).
+
+    The remainder of a small negative number rounds to the size of the box itself, which the periodic search refuses:
+    it is the same place as 0.
+    """
+    inside = position.copy()
+    inside[:, :2] %= size
+    inside[:, :2] = np.where(inside[:, :2] < size, inside[:, :2], 0.0)
+    return inside
+
+
 def count_contacts(spec: BoxSpec, particles: Particles) -> tuple[int, int, float]:
     """(particle pairs in contact, particles touching the base, largest overlap over contact distance)."""
     size = np.array([spec.length, spec.depth])
-    position = particles.position.copy()
-    position[:, :2] %= size
+    position = wrapped(particles.position, size)
     radius = spec.diameters[particles.classes] / 2.0
     period = [spec.length, spec.depth, 0.0]
     tree = cKDTree(position, boxsize=period)
@@ -27,9 +38,7 @@ def count_contacts(spec: BoxSpec, particles: Particles) -> tuple[int, int, float
     if spec.base.flat:
         on_base = position[:, 2] < radius
     else:
-        glued = spec.base.positions.copy()
-        glued[:, :2] %= size
-        frit = cKDTree(glued, boxsize=period)
+        frit = cKDTree(wrapped(spec.base.positions, size), boxsize=period)
         reach = float(radius.max()) + spec.base.diameter / 2.0
         links = tree.sparse_distance_matrix(frit, reach, output_type="coo_matrix")
         near = links.data < radius[links.row] + spec.base.diameter / 2.0
