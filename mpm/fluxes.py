@@ -48,7 +48,11 @@ def exponential_flux(velocity: Floats, conductance: Floats) -> tuple[Floats, Flo
 
 
 def effective_diffusivity(case: Case, strip: Strip, diffusivity: float) -> tuple[Floats, Floats]:
-    """eps D / tau^2 along x and y in every local cell [m2/s]."""
+    """eps D / tau^2 along x and y in every local cell [m2/s], with tau^2 the tortuosity factor (TauFactor's, table 5.4 of the thesis).
+
+    The thesis prints D eps/tau with tau a ratio of lengths (5-6) and leaves the flux in its porous zones unreduced (5-12, 5-13):
+    docs/source.md says what either changes.
+    """
     rows_x, rows_y = [], []
     for index in strip.grid.row_layer:
         material = case.geometry.layers[index].material

@@ -4,7 +4,9 @@ Built-in values are those of the thesis, chapter 5: porosity, permeability and t
 (permeability is printed in "um^-2", um^2 is meant), surface to volume ratio, site density and solids from table
 5.3, particle size and sphericity of the glass beads (GL56) from table 3.2. Tables 5.3 and 5.4 disagree about the
 surface: 5.3, with which the thesis computed, has 58,000 1/m (bed) and 100,000 1/m (frit); 5.4 has 73,000 and
-62,000 1/m per total volume. Felt and mesh keep the frit value of 5.3, the only one it gives.
+62,000 1/m per total volume. Felt and mesh keep the frit value of 5.3, the only one it gives. Where the thesis contradicts itself the
+tables are taken: the sphericity is 0.79 (0.80 under table 5.4), the mesh has its larger factor through the plane (its smaller, says the
+text). docs/source.md lists such places.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def shear_distance(height: float, solid: Material | None) -> float:
 
 
 def inertia(u: Expr, v: Expr, m: Medium) -> Form:
-    """(rho/eps) u . v, to be divided by the time step."""
+    """(rho/eps) u . v, to be divided by the time step; here and in `convection` the thesis has eps on rho v in the first term alone."""
     return (m.density / m.porosity) * inner(u, v) * dx
 
 
@@ -128,7 +128,7 @@ def viscosity(u: Expr, v: Expr, m: Medium, closed: ufl.Measure) -> Form:
 
 
 def drag(u: Expr, v: Expr, m: Medium) -> Form:
-    """(mu/K) u, per direction."""
+    """(mu/K) u, per direction; with `bed_entrainment` relative to a moving solid. The thesis (5-9) has -mu C |u| of the gas alone."""
     return (m.resistance_x * u[0] * v[0] + m.resistance_y * u[1] * v[1]) * dx
 
 

@@ -70,9 +70,10 @@ class Flight:
 
 
 def thesis_phases(vibration: Vibration, liftoff_velocity: float) -> tuple[float, float]:
-    """Lift-off and contact phase [rad] of the seed's piecewise profile.
+    """Lift-off and contact phase [rad] of the preset "thesis": this project's reading of the one number that is printed.
 
-    Lift-off is where the reactor's falling vertical velocity reaches `liftoff_velocity` [m/s, negative]; the bed keeps that
+    Table 5.3 has a "liftoff y-velocity" of -0.40 cm/s and the text a piecewise horizontal velocity; no phases are given. Here lift-off is
+    where the reactor's falling vertical velocity reaches `liftoff_velocity` [m/s, negative]; the bed keeps that
     velocity until the reactor comes up to meet it. At base conditions 97.85 and 18.71 degrees.
 
     Raises InputError when the reactor never moves that fast.

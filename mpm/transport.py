@@ -247,7 +247,10 @@ class Transport:
         return supply
 
     def outlet_means(self, operators: list[FluxOperator], concentration: Floats) -> dict[str, Floats]:
-        """Area mean of the cells next to each outlet, (species,) [mol/m3], where any outlet draws in (else nothing); collective."""
+        """Area mean of the cells next to each outlet, (species,) [mol/m3], where any outlet draws in (else nothing); collective.
+
+        One row of cells; the thesis takes two.
+        """
         if not operators or not operators[0].drawn_in:
             return {}
         operator = operators[0]

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from mpm.case import load_case
+from mpm.check import check_case
+from mpm.cli import parse_settings
 from mpm.geometry import Grid
 from mpm.output import RunDirectory
 
@@ -53,6 +55,38 @@ def test_readers_of_the_documentation(tmp_path: Path, monkeypatch: pytest.Monkey
     assert np.array_equal(with_pyvista["bed"]["theta_OAl(CH3)2"], bed)
     assert np.array_equal(with_mpm["bed"].ravel(), bed)
     assert np.array_equal(with_numpy["concentration"], (number * 80).astype(np.float32))
+
+
+def test_settings_of_the_list_of_differences() -> None:
+    """Fails when a setting of docs/source.md that gives the thesis' reading is refused, or changes nothing."""
+    text = (ROOT / "docs" / "source.md").read_text(encoding="utf-8")
+    settings = [s for s in re.findall(r"`([^`\n]+=[^`\n]+)`", text) if re.match(r"[a-z]+\.", s)]
+    assert len(settings) >= 14
+    for setting in settings:
+        changes = parse_settings([setting])
+        base = load_case(
+            "single_zone", {"geometry.layer.frit.material": "frit_mesh"} if "frit_mesh" in setting else {}
+        )
+        assert base.with_(changes) != base, setting
+
+
+def test_figures_of_the_list_of_differences() -> None:
+    """Fails when an excess number or a mesh of docs/source.md is no longer what `mpm check` prints."""
+    changed = {
+        1.79: {},
+        8.96: {"geometry.inlet.tma.mass_fractions.TMA": 1e-3},
+        1.48: {"gas.pressure": "626 torr"},
+    }
+    for excess, changes in changed.items():
+        report = check_case(load_case("single_zone", changes))
+        assert report["inlets"]["tma"]["excess_number"] == pytest.approx(excess, abs=5e-3)
+    rows = {"plenum": 26, "frit": 10, "bed": 18, "headspace": 67}
+    fine = load_case("single_zone", {f"geometry.layer.{name}.cells": n for name, n in rows.items()})
+    assert Grid.from_case(fine).cells == 49731 and Grid.from_case(load_case("single_zone")).cells == 28359
+    bare = {"material.glass_beads.tortuosity_factor": 0.46}
+    assert check_case(load_case("single_zone", bare))["inlets"]["tma"]["Pe_bed"] == pytest.approx(
+        0.21, abs=5e-3
+    )
 
 
 @pytest.mark.parametrize(

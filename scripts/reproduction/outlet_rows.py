@@ -66,7 +66,7 @@ def three_segments(lab: Lab) -> Finding:
     low, high = (numbers[f"headspace {h}"]["knees"] for h in (HEIGHTS[0], HEIGHTS[2]))
     why = (
         "Knees are where the signal passes 10 and 90 % of its largest value. They move with the dose and "
-        "with the headspace, which the thesis does not print: with Y 1e-3 "
+        "with the headspace, which the thesis prints for the machine alone: with Y 1e-3 "
         f"{low[0]:.1f} and {low[1]:.1f} s at {HEIGHTS[0]}, {high[0]:.1f} and {high[1]:.1f} s at {HEIGHTS[2]}."
     )
     return Finding(checks.verdict, measured, numbers, why)

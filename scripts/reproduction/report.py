@@ -29,6 +29,8 @@ on. The base cases are [cases/thesis](../cases/thesis): 473 K, Gamma 0.30, 16 Hz
 Y_TMA = 1e-3 in one zone and 2e-4/7.5e-5 in the full cycle. *Box* is the bed from the left end of a zone to its
 precursor port's centreline. Lengths upstream of a port are positive.
 
+What is assumed because the thesis does not print it, and where the model departs from its equations: [source.md](source.md).
+
 """
 
 
