@@ -31,11 +31,11 @@ from mpm.caseio import assemble, built_in_files, find_file, read_toml, write_tom
 from mpm.chemistry import Mechanism
 from mpm.constants import GRAVITY
 from mpm.diffusion import scaled_diffusivity
-from mpm.files import read_text
+from mpm.files import is_file, read_text
 from mpm.gases import CARRIERS, ideal_gas_density
 from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
-from mpm.mechanism import Chemistry, build_mechanism
+from mpm.mechanism import Chemistry, build_mechanism, check_rates
 from mpm.messages import to_input_error
 from mpm.profile import BedProfile, read_profile
 from mpm.units import (
@@ -52,6 +52,7 @@ from mpm.units import (
     Temperature,
     Velocity,
     Viscosity,
+    in_range,
     reject,
     worked_out,
     write_defaults,
@@ -121,6 +122,8 @@ class Gas(Frozen):
             )
             for species in left_out
         }
+        for name, value in default.items():
+            in_range(f"gas.diffusivity.{name}", value, "m^2/s")
         values = {**default, **self.diffusivity}
         self.__dict__["diffusivity"] = {name: values[name] for name in mechanism.species_names}
 
@@ -138,9 +141,10 @@ class Gas(Frozen):
         if "molar_mass" not in given and model is not None:
             values["molar_mass"] = model.molar_mass
         if "viscosity" not in given and model is not None:
-            values["viscosity"] = model.viscosity(self.temperature)
+            values["viscosity"] = in_range("viscosity", model.viscosity(self.temperature), "Pa s")
         if "density" not in given:
-            values["density"] = ideal_gas_density(self.pressure, self.molar_mass, self.temperature)
+            density = ideal_gas_density(self.pressure, self.molar_mass, self.temperature)
+            values["density"] = in_range("density", density, "kg/m^3")
         return self
 
 
@@ -281,6 +285,7 @@ class Case(Frozen):
             if layer.material_name is not None:
                 layer._material = self.materials[layer.material_name]
         self._check_chemistry()
+        check_rates(self._mechanism, self.gas.temperature)
         self.gas.complete(self._mechanism)
         if self.transport.vibrational_dispersion and self.fidelity == "resolved":
             raise reject(
@@ -314,6 +319,12 @@ class Case(Frozen):
                 "a gas that takes no part",
                 key="gas.carrier",
             )
+        for key, name in (
+            ("gas.carrier", self.gas.carrier),
+            *(("material", name) for name in self.materials),
+        ):
+            if not name or not name.isprintable():
+                raise reject(repr(name), "a name of printable characters", key=key)
         for place, names, known in (
             *(
                 (f"geometry.inlet.{i.name}.mass_fractions", i.mass_fractions, species)
@@ -393,7 +404,7 @@ def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, An
     if isinstance(source, Mapping):
         return _build(source, overrides or {}, Path.cwd(), "case")
     path = Path(source)
-    if isinstance(source, str) and not path.is_file() and source in built_in_files("cases"):
+    if isinstance(source, str) and not is_file(path) and source in built_in_files("cases"):
         path = find_file("cases", source, Path.cwd(), source, "")
     case = _build(read_toml(path), overrides or {}, path.resolve().parent, str(source))
     case._source = path

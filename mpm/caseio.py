@@ -8,7 +8,7 @@ merged here, later ones over earlier ones; entries of lists are matched by their
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -16,19 +16,29 @@ from typing import Any, TypeGuard
 import tomli_w
 
 from mpm.errors import InputError
-from mpm.files import read_text
+from mpm.files import is_file, read_text
 from mpm.materials import BUILT_IN
 
 Table = dict[str, Any]
 
+DEEPEST = 30
+"""Levels of tables and lists in a file; a case needs five."""
+
+_ACTIVATION = ("b", "Ea", "reference_temperature")
 _REPLACES = {
-    "sticking": ("A", "b", "Ea", "reference_temperature"),
+    "sticking": ("A",),
     "A": ("sticking",),
     "windows": ("start", "stop"),
     "kozeny_constant": ("permeability",),
     "permeability": ("kozeny_constant",),
 }
 """A key written over a table removes the other ways to say the same from it."""
+
+
+def _replaced(table: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    """Keys of `table` that `key`, written over it, replaces; b and Ea of a rate constant go with it, not those of the same kind."""
+    rivals = tuple(rival for rival in _REPLACES.get(key, ()) if rival in table)
+    return (*rivals, *_ACTIVATION) if key in ("sticking", "A") and rivals else rivals
 
 
 def read_toml(path: Path) -> Table:
@@ -50,7 +60,10 @@ def read_source(path: Path) -> str:
 def parse_toml(text: str, source: str | Path) -> Table:
     """Parse the text of a TOML file; InputError for what is none."""
     try:
-        return tomllib.loads(text)
+        table = tomllib.loads(text)
+        if _deeper_than(DEEPEST, table):
+            raise ValueError(f"tables or lists nested more than {DEEPEST} deep")
+        return table
     except tomllib.TOMLDecodeError as error:
         raise InputError.at(source, "", f"a TOML syntax error ({error})", "valid TOML") from None
     except (
@@ -58,6 +71,14 @@ def parse_toml(text: str, source: str | Path) -> Table:
         RecursionError,
     ) as error:  # an integer of 5,000 digits, a list in a list in a list ...
         raise InputError.at(source, "", f"more than can be read ({error})", "valid TOML") from None
+
+
+def _deeper_than(levels: int, value: Any) -> bool:
+    """Whether tables and lists are nested in more than so many levels."""
+    if not isinstance(value, dict | list):
+        return False
+    inner = value.values() if isinstance(value, dict) else value
+    return levels == 0 or any(_deeper_than(levels - 1, entry) for entry in inner)
 
 
 def built_in_files(folder: str) -> dict[str, Path]:
@@ -72,10 +93,10 @@ def built_in_files(folder: str) -> dict[str, Path]:
 def find_file(folder: str, name: str, near: Path, source: str, key: str) -> Path:
     """The file that `name` stands for: a path relative to the folder `near`, or a built-in of `folder`."""
     built_in = built_in_files(folder)
-    if name in built_in and not (near / name).is_file():
-        return built_in[name]
     path = near / name
-    if not path.is_file():
+    if name in built_in and not is_file(path):
+        return built_in[name]
+    if not is_file(path):
         raise InputError.at(
             source,
             key,
@@ -89,9 +110,8 @@ def find_file(folder: str, name: str, near: Path, source: str, key: str) -> Path
 
 def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:
     """Lay table `over` upon table `under`: tables merge by key, lists of named tables by name, all else is replaced."""
-    result = {
-        key: value for key, value in under.items() if not any(key in _REPLACES.get(new, ()) for new in over)
-    }
+    gone = {rival for key in over for rival in _replaced(under, key)}
+    result = {key: value for key, value in under.items() if key not in gone}
     for key, value in over.items():
         below = result.get(key)
         if isinstance(value, Mapping) and isinstance(below, Mapping):
@@ -105,7 +125,9 @@ def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:
 
 def _named(value: Any) -> TypeGuard[list[Table]]:
     return (
-        isinstance(value, list) and bool(value) and all(isinstance(v, Mapping) and "name" in v for v in value)
+        isinstance(value, list)
+        and bool(value)
+        and all(isinstance(v, Mapping) and isinstance(v.get("name"), str) for v in value)
     )
 
 
@@ -123,8 +145,11 @@ def _merge_lists(under: list[Table], over: list[Table]) -> list[Table]:
     return result
 
 
-def set_key(data: Table, key: str, value: Any, source: str) -> None:
-    """Set the entry at a dotted key such as `geometry.inlet.tma.velocity`; list entries are addressed by their name."""
+def set_key(data: Table, key: str, value: Any, source: str, kept: Collection[str] = ()) -> None:
+    """Set the entry at a dotted key such as `geometry.inlet.tma.velocity`; list entries are addressed by their name.
+
+    It replaces other ways to say the same, except for the `kept` dotted keys: those were set beside it.
+    """
     node: Any = data
     parts = key.split(".")
     for i, part in enumerate(parts[:-1]):
@@ -138,8 +163,9 @@ def set_key(data: Table, key: str, value: Any, source: str) -> None:
     if isinstance(node, list):
         raise InputError.at(source, key, "a whole entry", "a key of that entry, such as name", given="")
     value = value.tolist() if hasattr(value, "tolist") else value  # numpy scalars and arrays
-    for rival in _REPLACES.get(parts[-1], ()):
-        node.pop(rival, None)
+    for rival in _replaced(node, parts[-1]):
+        if ".".join((*parts[:-1], rival)) not in kept:
+            node.pop(rival, None)
     node[parts[-1]] = deepcopy(value)
 
 
@@ -169,12 +195,13 @@ def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path
     if isinstance(gas, dict) and not isinstance(gas.get("diffusivity", {}), dict):
         gas["diffusivity"] = {"default": gas["diffusivity"]}
     for key, value in overrides.items():
-        set_key(result, key, value, source)
+        set_key(result, key, value, source, overrides)
     _insert_materials(result, source)
     _spread_diffusivity(result)
     profile = _table(result, "motion").get("profile", "thesis")
     if isinstance(profile, str) and profile not in ("thesis", "phases"):
-        result["motion"]["profile"] = str((folder / profile).resolve())
+        path = folder / profile
+        result["motion"]["profile"] = str(path.resolve() if is_file(path) else path)
     return result
 
 

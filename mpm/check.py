@@ -7,7 +7,7 @@ from typing import Any
 
 from mpm import engineering as eng
 from mpm.case import Case
-from mpm.caveats import feed_caveats, gas_caveats, mass_caveats, profile_caveats
+from mpm.caveats import gas_caveats, mass_caveats, profile_caveats
 from mpm.chemistry import inlet_concentrations
 from mpm.dem.relations import (
     mean_free_path,
@@ -71,9 +71,8 @@ def check_case(case: Case) -> dict[str, Any]:
     bed = case.geometry.moving_layer
     if bed is not None:
         report["bed"] = _bed(case, bed)
-    report = _finite(report)
-    report["warnings"] = warnings(case, report)
-    return report
+    report["warnings"] = warnings(case, report)  # before anything is dropped that they speak of
+    return {key: _finite(entry) for key, entry in report.items()}
 
 
 def _finite(value: Any) -> Any:
@@ -164,7 +163,7 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
         numbers["residence_time"] = geometry.length / abs(case.motion.mean_velocity)
     if material.particle_diameter is not None:
         numbers["Re_particle"] = eng.reynolds(gas.density, rising, material.particle_diameter, gas.viscosity)
-        if material.density is not None:
+        if material.density is not None and material.density > gas.density:
             ergun = minimum_fluidisation_velocity(
                 material.particle_diameter,
                 material.sphericity,
@@ -183,7 +182,7 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
 
 def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     """What is legal but questionable, one sentence each. A number that `report` lacks was not finite."""
-    found = [*profile_caveats(case), *gas_caveats(case), *mass_caveats(case), *feed_caveats(case)]
+    found = [*profile_caveats(case), *gas_caveats(case), *mass_caveats(case)]
     motion, bed = report["motion"], report.get("bed", {})
     speed = abs(case.motion.mean_velocity)
     if case.motion.gamma > 0.0 and bed and speed > motion.get("perfect_flight", math.inf):

@@ -5,7 +5,8 @@ Rates are *rates of progress* of the reaction as written (Fluent's convention, e
     surface   r = k(T) C_gas theta_site   [mol/m2/s]   first order in the one gas and the one site it consumes
     gas       r = k(T) C_1 C_2            [mol/m3/s]   second order, whatever the stoichiometry
 
-    k(T) = A (T/T_ref)^b exp(-Ea/(R T)),    or  lambda sqrt(R T / (2 pi M))  with a sticking coefficient lambda
+    k(T) = A (T/T_ref)^b exp(-Ea/(R T)),    or  lambda sqrt(R T / (2 pi M))  with a sticking coefficient
+    lambda(T) = sticking (T/T_ref)^b exp(-Ea/(R T)), the form a T^b exp(-Ea/(R T)) of Chemkin and Cantera with T_ref = 1 K
 
 Mechanisms are read from files and from the case by `mpm.mechanism`.
 """
@@ -61,8 +62,15 @@ class _Reaction:
         return self.equation
 
     def _arrhenius(self, temperature: ArrayLike) -> Floats:
+        return self.A * self._activation(temperature)
+
+    def _activation(self, temperature: ArrayLike) -> Floats:
+        """(T/T_ref)^b exp(-Ea/(R T)), infinite where it is beyond floats."""
         T = np.asarray(temperature, dtype=float)
-        return self.A * (T / self.reference_temperature) ** self.b * np.exp(-self.Ea / (GAS_CONSTANT * T))
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            return np.asarray(
+                (T / self.reference_temperature) ** self.b * np.exp(-self.Ea / (GAS_CONSTANT * T))
+            )
 
 
 @dataclass(frozen=True)
@@ -83,12 +91,22 @@ class SurfaceReaction(_Reaction):
     def rate_constant(self, temperature: ArrayLike, molar_mass: float) -> Floats:
         """k [m/s] at `temperature` [K], in its shape; `molar_mass` [kg/mol] of the gas matters with sticking only.
 
-        Kinetic theory: the flux onto a wall is C sqrt(R T/(2 pi M)), of which the share `sticking` reacts.
+        Kinetic theory: the flux onto a wall is C sqrt(R T/(2 pi M)), of which the share `sticking_coefficient` reacts.
         """
         if self.sticking is None:
             return self._arrhenius(temperature)
         T = np.asarray(temperature, dtype=float)
-        return np.asarray(self.sticking * np.sqrt(GAS_CONSTANT * T / (2.0 * np.pi * molar_mass)))
+        share = self.sticking_coefficient(T)
+        return np.asarray(share * np.sqrt(GAS_CONSTANT * T / (2.0 * np.pi * molar_mass)))
+
+    def sticking_coefficient(self, temperature: ArrayLike) -> Floats:
+        """Share of the collisions with the one site it consumes that react at `temperature` [K]: sticking (T/T_ref)^b exp(-Ea/(R T)).
+
+        Chemkin and Cantera write the same as a T^b exp(-Ea/(R T)), that is with T_ref = 1 K (Cantera, "Sticking reactions"; Kee, Coltrin,
+        Glarborg, Chemically Reacting Flow, 2003, section 11.5).
+        """
+        assert self.sticking is not None
+        return np.asarray(self.sticking * self._activation(temperature))
 
     @property
     def product_sites(self) -> tuple[str, ...]:

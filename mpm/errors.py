@@ -6,6 +6,9 @@ import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
+LONGEST_LINE = 2000
+"""Characters of a message: what was found may be a file in itself."""
+
 
 class MpmError(Exception):
     """Base of every error that has a message for the user; the command line prints it without a traceback."""
@@ -20,6 +23,12 @@ class InputError(MpmError):
     """
 
     exit_status = 2
+
+    def __init__(self, line: str):
+        line = printable(line)
+        super().__init__(
+            line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 500]} ... {line[-500:]}"
+        )
 
     @classmethod
     def at(
@@ -43,7 +52,7 @@ class InputError(MpmError):
         line = ": ".join([*parts, f"found {found}; accepted: {accepted}"]) + suggestion(
             given or key.rpartition(".")[2], known
         )
-        return cls(printable(line))
+        return cls(line)
 
 
 class ConvergenceError(MpmError):

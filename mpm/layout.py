@@ -48,6 +48,9 @@ RESERVED_LAYERS = ("height",)
 MOST_CELLS = 100_000_000
 """A mesh beyond this is a slip of the unit, not a plan."""
 
+THINNEST = 1e-9
+"""Share of the strip's height that a row needs at least: edges closer to each other are lost in rounding."""
+
 _INSTANT = Dimension("s", "a time", "5 s", at_least=0.0)
 _DEADLINE = Dimension("s", "a time", "5 s", above=0.0, infinite=True)
 
@@ -79,7 +82,7 @@ def _write_windows(pairs: tuple[tuple[float, float], ...]) -> list[list[Any]]:
 
 Name = Annotated[str, AfterValidator(_name)]
 Flag = Annotated[bool, Strict()]
-Count = Annotated[int, Strict(), Field(ge=1)]
+Count = Annotated[int, Strict(), Field(ge=1, le=MOST_CELLS)]
 Windows = Annotated[
     tuple[tuple[float, float], ...],
     PlainValidator(_read_windows),
@@ -249,6 +252,15 @@ class Geometry(Frozen):
         cells = self.columns * sum(layer.cells for layer in self.layers)
         if cells > MOST_CELLS:
             raise reject(f"{cells:.2g} cells", f"a mesh of at most {MOST_CELLS:.0e} cells", key="cell_width")
+        height = sum(layer.height for layer in self.layers)
+        for layer in self.layers:
+            thinnest = layer.height / layer.cells / max(layer.grading, 1.0 / layer.grading)
+            if thinnest < THINNEST * height:
+                raise reject(
+                    f"rows of about {thinnest:.2g} m in a strip {height:.3g} m high",
+                    f"rows of at least {THINNEST:g} of its height",
+                    key=f"layer.{layer.name}.height",
+                )
         _check_names("layer", self.layers)
         _check_names("port", (*self.inlets, *self.outlets))
         _check_names("zone", self.zones)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mpm.case import Case, Inlet
 from mpm.geometry import Grid
+from mpm.labels import literal
 from mpm.results import Run, fed_by
 from mpm.vtu import Snapshot
 
@@ -27,11 +28,6 @@ DECADES = 4
 LINE = 8.5
 """Height of a line of small text [points]."""
 MM = 1e3
-
-
-def literal(text: str) -> str:
-    """`text` as matplotlib shows it letter by letter: a dollar sign begins no formula."""
-    return text.replace("$", r"\$")
 
 
 def formula(name: str) -> str:

@@ -27,6 +27,7 @@ from mpm.units import (
     Porosity,
     Positive,
     describe,
+    in_range,
     reject,
     worked_out,
 )
@@ -119,6 +120,14 @@ class Material(BaseModel):
     def _fill_in(self) -> Self:
         given, d = self.model_fields_set, self.particle_diameter
         values = self.__dict__
+        if self.kozeny_constant is not None and d is not None and "permeability" in given:
+            k = kozeny_carman(self.porosity, d, self.sphericity, self.kozeny_constant)
+            if any(abs(given_k - k) > 1e-9 * k for given_k in self.permeability):  # a resolved case has both
+                raise reject(
+                    f"kozeny_constant, which makes {k:.4g} m^2, beside another permeability",
+                    "one of them",
+                    key="kozeny_constant",
+                )
         if "permeability" not in given:
             if d is None or self.kozeny_constant is None:
                 raise reject(
@@ -127,7 +136,7 @@ class Material(BaseModel):
                     key="permeability",
                 )
             k = kozeny_carman(self.porosity, d, self.sphericity, self.kozeny_constant)
-            values["permeability"] = (k, k)
+            values["permeability"] = (in_range("permeability", k, "m^2"),) * 2
         if "tortuosity_factor" not in given:
             values["tortuosity_factor"] = (self.porosity**-0.5,) * 2
         if "surface_to_volume" not in given:
@@ -137,7 +146,8 @@ class Material(BaseModel):
                     'a surface per total volume, e.g. "58000 1/m", or a particle_diameter',
                     key="surface_to_volume",
                 )
-            values["surface_to_volume"] = (1.0 - self.porosity) * 6.0 / (self.sphericity * d)
+            surface = (1.0 - self.porosity) * 6.0 / (self.sphericity * d)
+            values["surface_to_volume"] = in_range("surface_to_volume", surface, "1/m")
         if self.initial_coverage and abs(sum(self.initial_coverage.values()) - 1.0) > 1e-9:
             raise reject(
                 f"coverages that sum to {sum(self.initial_coverage.values()):g}",

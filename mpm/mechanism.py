@@ -9,6 +9,7 @@ Every reaction is checked for the balance of its elements and of its sites when 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -18,6 +19,7 @@ from pydantic_core import PydanticCustomError
 
 from mpm.chemistry import GasReaction, Mechanism, Site, Species, SurfaceReaction
 from mpm.units import (
+    LARGEST,
     Density,
     Dimension,
     Fraction,
@@ -78,7 +80,7 @@ class FilmTable(SiteTable):
 
 
 class ReactionTable(_Table):
-    """`[reaction.KEY]`: an equation with either `sticking` or Arrhenius' `A`, `b`, `Ea`."""
+    """`[reaction.KEY]`: an equation with `sticking` or `A`, either times (T/reference_temperature)^b exp(-Ea/RT)."""
 
     equation: str
     sticking: Fraction | None = None
@@ -101,6 +103,7 @@ class Chemistry(_Table):
     reaction: dict[str, ReactionTable] = {}
 
 
+_NAME = re.compile(r"[^\s.]+")
 _GROUP = re.compile(r"([A-Z][a-z]?)(\d*)|\(|\)(\d*)")
 
 
@@ -128,24 +131,35 @@ def parse_formula(formula: str) -> dict[str, float]:
     return stack[0]
 
 
-_TERM = re.compile(r"(\d+(?:\.\d+)?)?\s*(\S.*)$")
+_ARROW = re.compile(
+    r"<[-=]+>|[-=]+>|[\u2192\u27f6\u21d2\u27f9]|[\u21cc\u21cb\u2194\u21c4\u27f7\u21d4]|(?<=\s)=(?=\s)"
+)
+_ONE_WAY = re.compile(r"[-=]+>|[\u2192\u27f6\u21d2\u27f9]")
+_COUNT = re.compile(r"(\d+/\d+|\d+\.?\d*|\.\d+)\s*(\S.*)")
+EQUATION = 'an equation "A + 2 B -> C": -> is the arrow (no back reaction: that is a reaction of its own), coefficients are 2, 0.5 or 1/2'
 
 
 def parse_equation(equation: str, known: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, float]]:
     """Split `A + 2 B -> C` into the coefficients of its two sides; every name must be one of `known`.
 
-    Raises the validator error that names the unknown species, with its nearest neighbour.
+    `=>` and the arrows of Unicode are read as `->`, blanks around + may be missing. Raises the validator error that names the unknown
+    species, with its nearest neighbour, or says how an equation is written.
     """
-    sides: list[dict[str, float]] = []
-    for side in equation.split("->"):
-        terms: dict[str, float] = {}
-        for text in side.split(" + "):
-            match = _TERM.match(text.strip())
-            if match is None:
-                raise reject(repr(equation), 'an equation "A + 2 B -> C"', key="equation")
-            name, count = text.strip(), 1.0
-            if name not in known:
-                name, count = match.group(2), float(match.group(1) or 1)
+    arrows = _ARROW.findall(equation)
+    if len(arrows) != 1 or not _ONE_WAY.fullmatch(arrows[0]):
+        found = f"{equation!r}, with " + (" and ".join(arrows) if arrows else "no arrow")
+        raise reject(found, EQUATION, key="equation")
+    left, right = equation.split(arrows[0])
+    return _side(left, equation, known), _side(right, equation, known)
+
+
+def _side(side: str, equation: str, known: Mapping[str, Any]) -> dict[str, float]:
+    terms: dict[str, float] = {}
+    for text in side.split(" + "):
+        whole = _term(text, known)
+        for name, count in [whole] if whole[0] in known else [_term(part, known) for part in text.split("+")]:
+            if not name or not 0.0 < count < math.inf:
+                raise reject(repr(equation), EQUATION, key="equation")
             if name not in known:
                 raise reject(
                     f"{name!r} in {equation!r}",
@@ -155,10 +169,17 @@ def parse_equation(equation: str, known: Mapping[str, Any]) -> tuple[dict[str, f
                     known=list(known),
                 )
             terms[name] = terms.get(name, 0.0) + count
-        sides.append(terms)
-    if len(sides) != 2:
-        raise reject(repr(equation), 'an equation with one "->"', key="equation")
-    return sides[0], sides[1]
+    return terms
+
+
+def _term(text: str, known: Mapping[str, Any]) -> tuple[str, float]:
+    """Name and coefficient of `2 B`, `2B`, `.5 B`, `1/2 B` or `B`."""
+    text = text.strip()
+    match = None if text in known else _COUNT.fullmatch(text)
+    if match is None:
+        return text, 1.0
+    above, _, below = match.group(1).partition("/")
+    return match.group(2), float(above) / float(below or 1) if float(below or 1) else math.inf
 
 
 def write_equation(left: Mapping[str, float], right: Mapping[str, float]) -> str:
@@ -205,10 +226,10 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
                     "another name; formula = ... says what it is made of",
                     key=f"chemistry.species.{name}",
                 )
-            if name in seen or "." in name:
+            if name in seen or not _NAME.fullmatch(name) or not name.isprintable() or _ARROW.search(name):
                 raise reject(
                     f"{name!r}",
-                    "a name without dots that no other species, site or film has",
+                    "a name without blanks, dots and arrows that no other species, site or film has",
                     key=f"chemistry.{kind}.{name}",
                 )
             seen.add(name)
@@ -236,6 +257,31 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
         tuple(surface),
         tuple(gas),
     )
+
+
+def check_rates(mechanism: Mechanism, temperature: float) -> None:
+    """Refuse a sticking coefficient above 1 and a rate constant beyond floats at `temperature` [K]."""
+    reactions: list[SurfaceReaction | GasReaction] = [*mechanism.surface_reactions, *mechanism.gas_reactions]
+    for reaction in reactions:
+        key = f"chemistry.reaction.{reaction.key}"
+        if isinstance(reaction, SurfaceReaction):
+            constant = reaction.rate_constant(temperature, mechanism.get(reaction.gas).molar_mass)
+            if reaction.sticking is not None:
+                share = float(reaction.sticking_coefficient(temperature))
+                if not share <= 1.0:
+                    raise reject(
+                        f"sticking, b and Ea that make a sticking coefficient of {share:.3g} at {temperature:g} K",
+                        "one of at most 1: of the collisions no more than all can react",
+                        key=f"{key}.sticking",
+                    )
+        else:
+            constant = reaction.rate_constant(temperature)
+        if not float(constant) <= LARGEST:
+            raise reject(
+                f"A, b and Ea that make a rate constant of {float(constant):.3g} at {temperature:g} K",
+                f"one of at most {LARGEST:g}",
+                key=f"{key}.A",
+            )
 
 
 def _elements(kind: str, name: str, table: SpeciesTable | SiteTable) -> dict[str, float]:
@@ -310,6 +356,12 @@ def _surface_reaction(
             A = parse(table.A, "m/s")
         except ValueError:
             raise reject(repr(table.A), _SURFACE_RATE.accepted, key="A") from None
+    elif table.b and "reference_temperature" not in table.model_fields_set:
+        raise reject(
+            f"b = {table.b:g} beside sticking, and no reference_temperature",
+            'reference_temperature, at which sticking holds, e.g. "473 K"; "1 K" for a T^b as in Chemkin and Cantera',
+            key="b",
+        )
     return SurfaceReaction(
         key,
         write_equation(left, right),

@@ -12,7 +12,8 @@ from pydantic.fields import FieldInfo
 from mpm.errors import InputError
 from mpm.units import Dimension, describe
 
-_LATER = {"missing": 1}  # a misspelt key is both unknown and missing: say the former
+_LATER = {"missing": 1, "too_short": 2}
+"""A misspelt key is both unknown and missing: say the former. A list whose entries are all wrong counts as empty: say what is wrong."""
 
 
 def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, source: str) -> InputError:

@@ -31,7 +31,8 @@ from numpy.typing import NDArray
 from mpm.diagnostics import exit_column
 from mpm.errors import InputError
 from mpm.files import file_name
-from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, literal, species_figure
+from mpm.labels import literal
+from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, species_figure
 from mpm.results import Run, dosing_inlets, fed_species, load_run, made_sites, sites_made_by
 from mpm.vtu import Snapshot
 

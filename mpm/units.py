@@ -21,6 +21,28 @@ _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)(?![A-Za-z0-9_.])\s*(.*?)\s*$"
 )
 _JOINED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*?)\s*$")
+_LOOK_ALIKES = {
+    "-": re.compile("\u2212"),  # minus sign
+    "degC": re.compile(
+        "\u2103|[\u00b0\u00ba\u02da\u2218]\\s*C\\b"
+    ),  # degree sign, ordinal indicator, ring above, ring operator
+    "degF": re.compile("\u2109|[\u00b0\u00ba\u02da\u2218]\\s*F\\b"),
+    "deg": re.compile("[\u00ba\u02da\u2218]"),
+}
+"""Characters that keyboards and word processors put in place of the right ones, by what is meant."""
+_ADVICE = (
+    (re.compile(r"C"), 'C is the coulomb, degrees Celsius are "degC"'),
+    (re.compile(r"F"), 'F is the farad, degrees Fahrenheit are "degF"'),
+    (
+        re.compile(r"sccm|sccs|slm|slpm|sLm|NL/min|Nl/min", re.IGNORECASE),
+        "a flow at standard conditions; a port has the velocity flow/(width depth) at its own temperature and pressure",
+    ),
+    (re.compile(r",\d.*"), "the decimal sign is a point"),
+    (re.compile(r".*[A-Za-z\u00b5\u03bc]\d.*"), "powers are written m^2"),
+)
+"""What is often written, and what to write."""
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Magnitudes of quantities in SI units. What lies outside is a slip, and would overflow or vanish in the products of the model."""
 _ANGLES = {"radian", "degree", "turn", "arcminute", "arcsecond", "revolutions_per_minute", "grade"}
 
 
@@ -28,7 +50,9 @@ _ANGLES = {"radian", "degree", "turn", "arcminute", "arcsecond", "revolutions_pe
 def _registry() -> Any:
     import pint
 
-    return pint.UnitRegistry(non_int_type=Decimal, cache_folder=None)
+    registry = pint.UnitRegistry(non_int_type=Decimal, cache_folder=None)
+    registry.define("@alias torr = Torr")  # the symbol; pint has the name only
+    return registry
 
 
 def reject(found: str, accepted: str, **context: Any) -> PydanticCustomError:
@@ -48,6 +72,7 @@ def parse(text: str, unit: str) -> float:
 
     Raises ValueError with a short reason: no number, no unit, unknown unit, another dimension.
     """
+    text = _LOOK_ALIKES["-"].sub("-", text)
     match = _NUMBER.match(text) or _JOINED.match(text)
     if match is None:
         raise ValueError("no number with a unit")
@@ -55,18 +80,26 @@ def parse(text: str, unit: str) -> float:
     if not symbol:
         raise ValueError("no unit")
     registry = _registry()
+    advice = _advice(symbol)
+    for spelling in ("degC", "degF", "deg"):
+        symbol = _LOOK_ALIKES[spelling].sub(spelling, symbol)
     try:
         given = registry.Unit(symbol)
     except Exception as error:  # pint raises many types here, down to tokenizer errors
-        raise ValueError(f"unknown unit {symbol!r}") from error
+        raise ValueError(f"unknown unit {symbol!r}{advice}") from error
     wanted = registry.Unit(unit)
     if given.dimensionality != wanted.dimensionality or _counts_angle(given) != _counts_angle(wanted):
-        raise ValueError(f"{_dimension_text(given)}")
+        raise ValueError(f"{_dimension_text(given)}{advice}")
     if "inf" in number or "nan" in number:
         return float(number)
     if given == registry.degree:
         return math.radians(float(number))  # the float next to the true value; decimals of pi would miss it
     return float(registry.Quantity(Decimal(number), given).to(wanted).magnitude)
+
+
+def _advice(symbol: str) -> str:
+    """What to write instead of a unit that people use and that cannot be read, or means something else here."""
+    return next((f"; {advice}" for pattern, advice in _ADVICE if pattern.fullmatch(symbol)), "")
 
 
 def _counts_angle(unit: Any) -> bool:
@@ -111,7 +144,13 @@ class Dimension:
         else:
             if isinstance(value, str):
                 raise reject(f"{value!r}", self.accepted)
-            number = float(value)
+            try:
+                number = float(value)
+            except OverflowError:  # an integer of hundreds of digits
+                number = math.inf
+        if math.isfinite(number) and number and not SMALLEST <= abs(number) <= LARGEST:
+            limits = f"of a size from {SMALLEST:g} to {LARGEST:g} {self.unit}".strip()
+            raise reject(describe(value), f"{self.accepted}, {limits}")
         finite = math.isfinite(number) or (self.infinite and number == math.inf)
         inside = (
             (self.above is None or number > self.above)
@@ -171,6 +210,13 @@ class Dimension:
             "description": self.accepted,
             **{k: v for k, v in bounds.items() if v is not None},
         }
+
+
+def in_range(key: str, number: float, unit: str) -> float:
+    """`number`, worked out for `key` from other keys, when it has the size of a quantity; else the validator error."""
+    if not SMALLEST <= number <= LARGEST:
+        raise reject(f"keys that make it {number:.3g} {unit}", f"{SMALLEST:g} to {LARGEST:g} {unit}", key=key)
+    return number
 
 
 def worked_out(placeholder: Any = 0.0) -> Any:

@@ -14,11 +14,13 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from xml.sax.saxutils import unescape
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpm.errors import MpmError
+from mpm.labels import xml_attribute
 
 VTK_QUAD = 9
 VTK_TYPE = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "uint8": "UInt8"}
@@ -74,7 +76,7 @@ def encode_vtu(
         block = compressed_block(np.ascontiguousarray(values).tobytes())
         components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
         kind = VTK_TYPE[values.dtype.name]
-        line = f'<DataArray type="{kind}" Name="{name}"{components} format="appended" offset="{offset}"/>\n'
+        line = f'<DataArray type="{kind}" Name={xml_attribute(name)}{components} format="appended" offset="{offset}"/>\n'
         blocks.append(block)
         offset += len(block)
         return line
@@ -130,7 +132,9 @@ def read_vtu(path: str | Path) -> Snapshot:
         start = int(offset)
         (_, _, _, size) = struct.unpack_from("<4Q", appended, start)
         values = np.frombuffer(zlib.decompress(appended[start + 32 : start + 32 + size]), dtype=kind.lower())
-        arrays[name] = values.reshape(-1, int(components)) if components else values
+        arrays[unescape(name, {"&quot;": '"'})] = (
+            values.reshape(-1, int(components)) if components else values
+        )
     found = re.search(rb'Name="TimeValue"[^>]*>([^<]+)<', head)
     points, quads = arrays.pop("Points"), arrays.pop("connectivity").reshape(-1, 4)
     del arrays["offsets"], arrays["types"]
@@ -142,7 +146,8 @@ def read_vtu(path: str | Path) -> Snapshot:
 def encode_pvd(steps: Sequence[tuple[float, str]]) -> str:
     """The text of a `.pvd`: time [s] and path, relative to the `.pvd`, of every step."""
     lines = "".join(
-        f'<DataSet timestep="{time!r}" group="" part="0" file="{name}"/>\n' for time, name in steps
+        f'<DataSet timestep="{time!r}" group="" part="0" file={xml_attribute(name)}/>\n'
+        for time, name in steps
     )
     return (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'

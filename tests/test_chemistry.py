@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic_core import PydanticCustomError
 
 from mpm.case import Case, load_case
 from mpm.chemistry import inlet_concentrations, mole_fractions
@@ -93,6 +94,39 @@ def test_sticking_gives_kinetic_theory(case: Case) -> None:
     assert float(tma.rate_constant(300.0, 0.07209)) == pytest.approx(expected, rel=1e-14)
 
 
+def test_sticking_may_be_activated(case: Case) -> None:
+    """sticking (T/T_ref)^b exp(-Ea/RT), at 473 K 0.01 exp(-20 kJ/mol/RT) = 0.01 x 0.0062; with T_ref = 1 K the a T^b exp(-Ea/RT) of
+    Chemkin and Cantera. Fails when one of the keys has no effect, or one set beside sticking is lost, in whatever order."""
+    key = "chemistry.reaction.tma."
+    factor = math.exp(-20e3 / (R * 473.0))
+    assert factor == pytest.approx(0.0062, abs=5e-5)
+    plain = 0.01 * math.sqrt(R * 473.0 / (2.0 * math.pi * 0.07209))
+    for changes, expected in (
+        ({"sticking": 0.01, "Ea": "20 kJ/mol"}, factor),
+        ({"Ea": "20 kJ/mol", "sticking": 0.01}, factor),
+        ({"sticking": 0.01, "b": 1.0, "reference_temperature": "400 K"}, 473.0 / 400.0),
+        ({"sticking": 1e-5, "b": 1.0, "reference_temperature": "1 K"}, 1e-3 * 473.0),
+    ):
+        changed = case.with_({key + name: value for name, value in changes.items()})
+        for one in (changed, load_case(changed.to_dict())):
+            (tma,) = one.mechanism.half_reactions("TMA")
+            assert float(tma.rate_constant(473.0, 0.07209)) == pytest.approx(expected * plain, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"sticking": 0.01, "b": 1.0}, "no reference_temperature"),  # T^b in kelvin, or of T over what?
+        ({"sticking": 0.5, "Ea": "-20 kJ/mol"}, "a sticking coefficient of 80.8 at 473 K"),
+        ({"sticking": 0.5, "A": "1 m/s"}, "both sticking and A"),
+        ({"A": "1 m/s", "Ea": "-9e5 kJ/mol"}, "rate constant of inf"),
+    ],
+)
+def test_rates_that_cannot_be_are_refused(case: Case, changes: dict[str, Any], text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        case.with_({f"chemistry.reaction.tma.{name}": value for name, value in changes.items()})
+
+
 def test_an_override_replaces_the_other_form_of_the_rate(case: Case) -> None:
     """A over a sticking coefficient and back; also on the resolved dump, which spells the rate out."""
     sticky = case.with_({"chemistry.reaction.tma.sticking": 0.1})
@@ -127,6 +161,44 @@ def test_what_is_no_formula(formula: str) -> None:
 def test_equation_reads_coefficients_with_and_without_a_space() -> None:
     known = dict.fromkeys(("A", "B2", "C(D)3"))
     assert parse_equation("2 A + 3B2 -> 1.5 C(D)3", known) == ({"A": 2.0, "B2": 3.0}, {"C(D)3": 1.5})
+
+
+@pytest.mark.parametrize(
+    "equation",
+    [
+        "A+B2->.5 C+",
+        "A + B2 => 1/2 C+",
+        "A + B2 → 0.5C+",
+        "A +B2 --> .5 C+",
+        "A+B2 ⇒ 0.5 C+",
+        "A + 1 B2 ==> 1/2C+",
+    ],
+)
+def test_other_spellings_of_an_equation(equation: str) -> None:
+    """The arrows of Cantera and of word processors, blanks left out, fractions; a name may end in +."""
+    assert parse_equation(equation, dict.fromkeys(("A", "B2", "C+"))) == ({"A": 1.0, "B2": 1.0}, {"C+": 0.5})
+
+
+@pytest.mark.parametrize(
+    "equation",
+    [
+        "A + B2 = C",
+        "A + B2 <=> C",
+        "A + B2 ⇌ C",
+        "A <-> C",
+        "A + B2 C",
+        "A -> B2 -> C",
+        "-> C",
+        "A ->",
+        "0 A -> C",
+        "1/0 A -> C",
+    ],
+)
+def test_what_is_no_equation_is_told_how_to_write_one(equation: str) -> None:
+    """Fails when the line does not name the arrow: a reversible one would promise a back reaction that nothing computes."""
+    with pytest.raises(PydanticCustomError) as caught:
+        parse_equation(equation, dict.fromkeys(("A", "B2", "C")))
+    assert "-> is the arrow" in str(caught.value) and "1/2" in str(caught.value)
 
 
 def test_every_reaction_conserves_elements_and_sites(case: Case) -> None:
@@ -185,8 +257,8 @@ def test_an_inline_mechanism_starts_from_nothing() -> None:
         ({"equation": "OH + TMA -> CH4 + OAl(CH3)2", "A": "1 m/s", "sticking": 0.1}, "both sticking and A"),
         ({"equation": "TMA + 3 H2O -> 3 CH4 + Al(OH)3", "sticking": 0.1}, "second-order"),
         ({"equation": "TMA -> TMA", "A": "1 m^3/mol/s"}, "two different species"),
-        ({"equation": "OH + TMA = CH4 + OAl(CH3)2", "A": "1 m/s"}, "one of TMA"),
-        ({"equation": "OH -> TMA -> OH", "A": "1 m/s"}, 'one "->"'),
+        ({"equation": "OH + TMA = CH4 + OAl(CH3)2", "A": "1 m/s"}, "-> is the arrow"),
+        ({"equation": "OH -> TMA -> OH", "A": "1 m/s"}, "with -> and ->"),
     ],
 )
 def test_rate_laws_that_do_not_fit_are_refused(reaction: dict[str, Any], text: str) -> None:

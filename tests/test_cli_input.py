@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from mpm.caseio import built_in_files
 from mpm.cli import main
+from mpm.dem.case import load_case as load_powder
+from mpm.sweep.sweepfile import read_sweep
 
 PROFILE = "phase_deg,u_x_m/s,u_y_m/s,contact\n0,0.01,0,1\n90,0.02,0,1\n180,0.01,0,0\n270,0.0,0,0\n"
 ALUMINA = '[chemistry]\nmechanism = "alumina"\n'
@@ -406,6 +409,50 @@ def test_bad_arguments_are_refused_in_one_line(
 ) -> None:
     (folder / "case.toml").write_text(EXAMPLE)
     assert text in refused(capsys, folder, *arguments)
+
+
+BOM = "\ufeff"
+
+
+def test_a_byte_order_mark_is_read_over_in_every_file(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when a file that a Windows editor saved as "UTF-8 with BOM", line ends of Windows included, is refused."""
+    case = EXAMPLE.replace('"thesis"', '"profile.csv"').replace('"alumina"', '"own.toml"')
+    own = built_in_files("mechanisms")["alumina"].read_text(encoding="utf-8")
+    sweep = '[sweep]\ncase = "case.toml"\n[[sweep.axis]]\nkey = "motion.gamma"\nvalues = [0.3]\n'
+    record = "t,a_y,a_z\n" + "".join(f"{i / 160},{i % 10 - 4.5},{(i + 3) % 10 - 4.5}\n" for i in range(64))
+    powder = 'powder = "GL50"\n[waveform]\nkind = "accelerometer"\nfile = "record.csv"\n'
+    files = {
+        "case.toml": case,
+        "own.toml": own,
+        "profile.csv": PROFILE,
+        "sweep.toml": sweep,
+        "record.csv": record,
+    }
+    for name, text in {**files, "powder.toml": powder}.items():
+        (folder / name).write_bytes((BOM + text).replace("\n", "\r\n").encode())
+    assert main(["check", "case.toml"]) == 0
+    assert read_sweep(folder / "sweep.toml").base.mechanism.name == "alumina"
+    assert load_powder(folder / "powder.toml").build_waveform().frequency > 0.0
+    capsys.readouterr()
+    for name in ("case.toml", "own.toml", "profile.csv", "sweep.toml", "powder.toml"):
+        kept = (folder / name).read_bytes()
+        (folder / name).write_bytes(kept.decode().encode("utf-16"))
+        verb = {"sweep.toml": "sweep", "powder.toml": "dem"}.get(name, "check")
+        said = refused(capsys, folder, verb, {"check": "case.toml"}.get(verb, name))
+        assert name in said and "UTF-16 text, save it as UTF-8" in said
+        (folder / name).write_bytes(kept + b"# 3 \xb5m\n")
+        assert "byte 0xB5 in line " in refused(capsys, folder, verb, {"check": "case.toml"}.get(verb, name))
+        (folder / name).write_bytes(kept)
+
+
+def test_layers_without_cells_name_the_key(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when a list whose entries are all wrong is called empty."""
+    (folder / "case.toml").write_text(
+        '[geometry]\nlength = "9 mm"\nlayer = [ { name = "a", height = "1 mm" } ]\n'
+    )
+    assert "geometry.layer.a.cells: found nothing" in refused(capsys, folder, "check", "case.toml")
 
 
 def test_every_rank_refuses_and_one_speaks(folder: Path) -> None:

@@ -30,6 +30,7 @@ from mpm.units import (
     Speed,
     Temperature,
     Viscosity,
+    describe,
     reject,
 )  # fmt: skip
 
@@ -40,6 +41,7 @@ from .reading import one_line, set_dotted
 from .relations import ideal_gas_density
 from .waveform import Harmonic, HarmonicWaveform, Sawtooth, Waveform, from_table, seed_table_2_2, sine
 
+MOST_SEEDS = 10_000
 Acceleration = Annotated[float, Dimension("m/s^2", "an acceleration", "10.581 m/s^2")]
 Stiffness = Annotated[float, Dimension("N/m", "a spring stiffness", "30 N/m", above=0.0)]
 Hamaker = Annotated[float, Dimension("J", "a Hamaker constant", "3.1e-20 J", at_least=0.0)]
@@ -241,8 +243,8 @@ class RunInput(Section):
     @classmethod
     def count(cls, value: Any) -> Any:
         if isinstance(value, int) and not isinstance(value, bool):
-            if value < 1:
-                raise reject(f"{value}", "at least one seed")
+            if not 1 <= value <= MOST_SEEDS:
+                raise reject(describe(value), f"from 1 to {MOST_SEEDS} seeds")
             return tuple(range(1, value + 1))
         return value
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from mpm.errors import printable
 from mpm.files import write_atomically
+from mpm.labels import literal
 
 from .analysis import Results
 from .box import BoxSpec, Particles
@@ -43,7 +45,7 @@ def write_tables(directory: Path, case: DemCase, results: Results, waveform: Wav
     """profile.csv, its fit, the scaled profile when asked, voidage.csv, depth.csv, residence_times.csv."""
     mean = case.profile.mean_velocity
     about = (
-        f"{case.title}: DEM, seeds {', '.join(map(str, case.run.seeds))}, {waveform.frequency:g} Hz",
+        f"{printable(case.title)}: DEM, seeds {', '.join(map(str, case.run.seeds))}, {waveform.frequency:g} Hz",
         conditions(waveform, case.waveform.kind).line(),
     )
     results.curve.write(
@@ -139,7 +141,7 @@ def _velocity(case: DemCase, results: Results) -> Figure:
         axis.axhline(0, color="0.6", lw=0.6)
     upper.axhline(100 * results.seed_velocities.mean(), color=BED, lw=0.8, ls=":", label="cycle mean")
     upper.legend(loc="upper right", frameon=False)
-    upper.set_title(f"{case.title} (grey: lifted)", fontsize=10)
+    upper.set_title(f"{literal(case.title)} (grey: lifted)", fontsize=10)
     lower.plot(phase, 1e6 * results.rise, color=BASE, label="centre of mass")
     lower.plot(phase, 1e6 * results.gap, color=BASE, ls=":", label="lowest layers")
     lower.legend(loc="upper left", frameon=False)
@@ -162,7 +164,10 @@ def _voidage(case: DemCase, results: Results) -> Figure:
     figure.colorbar(image, label="voidage")
     highest = results.heights[results.solid.max(axis=0) > 0.01].max() / d
     axis.set(
-        xlabel="phase [deg]", ylabel="height above the base [d]", title=case.title, ylim=(0, highest + 2)
+        xlabel="phase [deg]",
+        ylabel="height above the base [d]",
+        title=literal(case.title),
+        ylim=(0, highest + 2),
     )
     return figure
 
@@ -177,7 +182,9 @@ def _depth(case: DemCase, results: Results) -> Figure:
         color=BED,
     )
     axis.set(
-        xlabel="mean velocity along the base [cm/s]", ylabel="height above the base [d]", title=case.title
+        xlabel="mean velocity along the base [cm/s]",
+        ylabel="height above the base [d]",
+        title=literal(case.title),
     )
     return figure
 
@@ -189,7 +196,7 @@ def _residence(case: DemCase, results: Results) -> Figure:
     if len(times):
         axis.hist(times, bins=40, range=(0.0, float(np.quantile(times, 0.98))), color=BED)
     length = 1e3 * case.profile.residence_length
-    axis.set(xlabel=f"time to travel {length:g} mm [s]", ylabel="particles", title=case.title)
+    axis.set(xlabel=f"time to travel {length:g} mm [s]", ylabel="particles", title=literal(case.title))
     return figure
 
 

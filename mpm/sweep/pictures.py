@@ -5,7 +5,6 @@ without a result leave a gap: a cross at the foot of a line, a hatched cell of a
 """
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mpm.files import file_name
+from mpm.labels import literal
 from mpm.sweep.quantities import factor
 from mpm.sweep.results import Results
 from mpm.sweep.sweepfile import Axis
@@ -41,10 +42,11 @@ def scale(axis: Axis, numbers: Sequence[float | str]) -> Scale:
     name = axis.name if "." not in axis.name else ".".join(axis.name.split(".")[-2:])
     if any(isinstance(number, str) for number in numbers):
         words = tuple(dict.fromkeys(map(str, numbers)))
-        return Scale(name, np.array([words.index(str(number)) for number in numbers], float), words, False)
+        places = np.array([words.index(str(number)) for number in numbers], float)
+        return Scale(literal(name), places, tuple(map(literal, words)), False)
     positions = np.array(numbers, float) / factor(axis.unit)
     wide = positions.min() > 0 and positions.max() / positions.min() >= LOGARITHMIC_FROM
-    label = f"{name} [{axis.unit}]" if axis.unit else name
+    label = literal(f"{name} [{axis.unit}]" if axis.unit else name)
     return Scale(label, positions, (), bool(positions.min() > 0 and (axis.logarithmic or wide)))
 
 
@@ -169,7 +171,7 @@ def draw(results: Results) -> list[Path]:
     files = []
     for name in names:
         values = np.array([number(row.get(name)) for row in rows])
-        label = f"{name} [{units[name]}]" if units[name] not in ("", "1") else name
+        label = literal(f"{name} [{units[name]}]" if units[name] not in ("", "1") else name)
         figure = Figure(figsize=(6.4, 4.8), layout="constrained")
         if len(free) == 1 or sweep.mode == "zip":
             line(figure, free[0], values, label)
@@ -177,8 +179,8 @@ def draw(results: Results) -> list[Path]:
             heat_map(figure, free[0], free[1], values, label)
         else:
             parallel_coordinates(figure, free, values, label)
-        figure.suptitle(sweep.title, fontsize="medium")
-        file = directory / f"{re.sub(r'[^\w.()+-]', '_', name)}.png"
+        figure.suptitle(literal(sweep.title), fontsize="medium")
+        file = directory / f"{file_name(name)}.png"
         figure.savefig(file, dpi=150)
         files.append(file)
     return files

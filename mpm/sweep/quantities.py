@@ -1,6 +1,7 @@
 """Values of an axis: what the sweep file says, the SI number for tables, and ranges in the file's own unit."""
 
 import functools
+import math
 import re
 from typing import Any
 
@@ -13,7 +14,7 @@ DIGITS = 12
 """Significant digits of computed values. Fewer than a float has: 0.3 stays 0.3 however a range arrives at it,
 and a point keeps its name when the range is refined."""
 
-NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+NUMBER = re.compile(r"\s*(?:[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)")
 
 
 def tidy(value: float) -> float:
@@ -48,7 +49,7 @@ def to_number(value: Any) -> tuple[float | str, str]:
     """
     if isinstance(value, bool):
         return str(value).lower(), ""
-    if isinstance(value, int | float):
+    if isinstance(value, int | float) and abs(value) <= units.LARGEST:
         return float(value), ""
     if isinstance(value, str):
         return _quantity(value) or (value, "")
@@ -87,6 +88,8 @@ class Range:
             raise InputError(
                 f"start = {start!r} and stop = {stop!r}, accepted are two numbers or two quantities"
             )
+        if not (math.isfinite(first) and math.isfinite(last)):
+            raise InputError(f"start = {start!r} and stop = {stop!r}, accepted are two finite ends")
         if one != other:
             raise InputError(
                 f"start = {start!r} and stop = {stop!r} differ in dimension ({one or '1'}, {other or '1'})"

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import platform
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -112,7 +113,7 @@ def provenance(results: Results) -> dict[str, Any]:
             "written_unit": axis.unit,
             "kind": "word" if isinstance(results.points[0].numbers[index], str) else "number",
             "logarithmic": axis.logarithmic,
-            "numbers": [to_number(level)[0] for level in axis.levels],
+            "numbers": [None if number == math.inf else number for number, _ in map(to_number, axis.levels)],
         }
         for index, axis in enumerate(sweep.axes)
     ]

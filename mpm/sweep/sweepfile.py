@@ -27,9 +27,12 @@ from typing import Any
 from mpm.case import Case, load_case
 from mpm.caseio import parse_toml, read_source
 from mpm.errors import InputError
+from mpm.files import is_file
 from mpm.sweep.conditions import Condition
 from mpm.sweep.quantities import Range, to_number, unit_as_written
+from mpm.units import LARGEST, describe
 
+MOST_POINTS = 100_000
 MODES = ("grid", "zip", "sample")
 METHODS = ("sobol", "latin_hypercube")
 SWEEP_KEYS = (
@@ -130,8 +133,10 @@ def _at_least(
     path: Path, key: str, table: Mapping[str, Any], least: int, default: int | None, where: str = "sweep"
 ) -> int:
     value = _take(path, where, table, key, int, default)
-    if value < least:
-        raise InputError.at(path, f"{where}.{key}", repr(value), f"a whole number of at least {least}")
+    if not least <= value <= MOST_POINTS:
+        raise InputError.at(
+            path, f"{where}.{key}", describe(value), f"a whole number from {least} to {MOST_POINTS}"
+        )
     return value
 
 
@@ -156,6 +161,9 @@ def _axis(path: Path, number: int, table: Any, sampled: bool) -> Axis:
         levels = table["values"]
         if not isinstance(levels, list) or not levels:
             raise InputError.at(path, where, repr(levels), "a list with at least one value")
+        for level in levels:
+            if isinstance(level, int | float) and not abs(level) <= LARGEST:
+                raise InputError.at(path, where, describe(level), f"numbers of at most {LARGEST:g}")
         kinds = {(type(number).__name__, unit) for number, unit in map(to_number, levels)}
         if len(kinds) > 1:
             units = ", ".join(sorted(unit or "1" for _, unit in kinds))
@@ -176,8 +184,8 @@ def _axis(path: Path, number: int, table: Any, sampled: bool) -> Axis:
     except InputError as error:
         raise InputError(f"{path}: {where}: {error}") from None
     num = ends.get("num", 1)
-    if not isinstance(num, int) or isinstance(num, bool) or num < 1:
-        raise InputError.at(path, f"{where}.num", repr(num), "a whole number of at least 1")
+    if not isinstance(num, int) or isinstance(num, bool) or not 1 <= num <= MOST_POINTS:
+        raise InputError.at(path, f"{where}.num", describe(num), f"a whole number from 1 to {MOST_POINTS}")
     _, si_unit = to_number(ends["start"])
     return Axis(name, tuple(keys), () if sampled else span.levels(num), span, span.unit, si_unit)
 
@@ -202,8 +210,9 @@ def _fixed(table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _base(path: Path, name: str, fixed: Mapping[str, Any]) -> Case:
     beside = path.parent / name
+    source: str | Path = beside if is_file(beside) or name.endswith(".toml") else name
     try:
-        return load_case(beside if beside.exists() or name.endswith(".toml") else name, fixed)
+        return load_case(source, fixed)
     except InputError as error:
         if fixed:
             raise InputError(f"{path}: sweep.case with sweep.set: {error}") from None
