@@ -86,19 +86,32 @@ def gas_caveats(case: Case) -> list[str]:
         found.append(
             f"gas.viscosity is {gas.viscosity:.3g} Pa s, {state} has about {model.viscosity(gas.temperature):.3g} Pa s"
         )
+    told: dict[str, list[str]] = {}  # species of whom the same is to be said
     for species in case.mechanism.species:
         value = gas.diffusivity[species.name]
         scaled = scaled_diffusivity(species, gas.carrier, gas.molar_mass, gas.temperature, gas.pressure)
-        if species.name in gas.scaled:
-            if carrier_ratio(species, gas.carrier, gas.molar_mass) is None:
-                found.append(
-                    f"gas.diffusivity of {species.name} is that in N2, {scaled:.3g} m2/s: nothing is known of it in {gas.carrier}, "
-                    "give a value"
-                )
-        elif value > 0.0 and _apart(value, scaled):
+        if species.name not in gas.scaled and value > 0.0 and _apart(value, scaled):
+            text = (
+                f"is {value:.3g} m2/s, in {state} it would be about {scaled:.3g} m2/s: left out, it is scaled"
+            )
+        elif species.name in gas.scaled and carrier_ratio(species, gas.carrier, gas.molar_mass) is None:
+            text = f"is that in N2, {scaled:.3g} m2/s: nothing is known of it in {gas.carrier}, give a value"
+        else:
+            continue
+        told.setdefault(text, []).append(species.name)
+    return found + [f"gas.diffusivity of {', '.join(names)} {text}" for text, names in told.items()]
+
+
+def feed_caveats(case: Case) -> list[str]:
+    """Inlets whose engineering numbers are of one of several precursors."""
+    found = []
+    for inlet in case.geometry.inlets:
+        species = case.mechanism.precursor(inlet.mass_fractions)
+        fed = [n for n, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reactions(n)]
+        if species is not None and len(fed) > 1:
             found.append(
-                f"gas.diffusivity of {species.name} is {value:.3g} m2/s, in {state} it would be about {scaled:.3g} m2/s: "
-                "left out, it is scaled"
+                f"inlet {inlet.name} feeds several precursors, {', '.join(fed)}: its excess number, titration, utilisation and front are "
+                f"those of {species}"
             )
     return found
 

@@ -21,7 +21,7 @@ from mpm.bed import Bed
 from mpm.check import check_case
 from mpm.diagnostics import State, Totals, total_concentration
 from mpm.dispersion import vibrational_dispersion
-from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
+from mpm.errors import ConvergenceError, InputError, Interrupted
 from mpm.flownumbers import flux_profiles
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
@@ -31,7 +31,7 @@ from mpm.progress import Progress, log_file
 from mpm.replay import March, Replay
 from mpm.schedule import Schedule, Step
 from mpm.signals import stop_signals
-from mpm.steady import SteadyProblem
+from mpm.steady import steady_problem
 from mpm.strip import Strip
 from mpm.summary import history_row, summarise
 from mpm.transport import Transport
@@ -197,23 +197,25 @@ class Reactor:
             bar.say(f"steady state, Newton step {iteration}, residual {residual:.1e} of the feed")
             self._check_stop()
 
-        self._start(bar)
-        assert self.flows is not None
-        problem = SteadyProblem(self, 0, watch)
         error: ConvergenceError | Interrupted | None = None
+        try:
+            self._start(bar)
+        except (ConvergenceError, Interrupted) as stopped:
+            log.error("%s", stopped)
+            raise
+        problem = steady_problem(self, 0, watch)
         try:
             problem.solve()
         except (ConvergenceError, Interrupted) as stopped:
             error = stopped
-        problem.settle_accounts()
-        self.steps = problem.iterations
-        self.sites_initially = total(self.comm, self.bed.content())
-        self.stored_initially = total(self.comm, self.transport.concentration @ self.transport.gas_volume)
         try:
-            if error is None:
-                require_balance(self.case, self.totals())
-        except BalanceError as unbalanced:
-            error = unbalanced
+            problem.settle_accounts()
+            self.steps = problem.iterations
+            self.sites_initially = total(self.comm, self.bed.content())
+            self.stored_initially = total(self.comm, self.transport.concentration @ self.transport.gas_volume)
+            require_balance(self.case, self.totals())
+        except ConvergenceError as unsettled:
+            error = error or unsettled
         if error is not None:
             log.error("%s", error)
         status = "done" if error is None else "interrupted" if isinstance(error, Interrupted) else "failed"
@@ -314,10 +316,10 @@ class Reactor:
 
     def _give_up(self, directory: RunDirectory | None, error: Exception) -> None:
         """Keep the last good state and say in summary.json how the run ended."""
+        log.error("%s", error)
         if directory is None or self.flows is None:
             return
         status = "interrupted" if isinstance(error, Interrupted) else "failed"
-        log.error("%s", error)
         if worst_balance(self.case, self.totals())[1] <= LIMIT:
             checkpoint.write(self, directory)
         self._write_numbers(directory, summarise(self, status, self.wall))

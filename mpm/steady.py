@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 from mpm.cellbalance import balance_cells
 from mpm.coarsening import coarser, prolong
 from mpm.errors import ConvergenceError
-from mpm.parallel import largest, total
+from mpm.parallel import any_rank, largest, total
 from mpm.replay import Replay
 from mpm.solvers import DirectSolver
-from mpm.steady_system import LAST_STEP, SteadySystem
+from mpm.steady_system import SteadySystem, doses
 from mpm.tracers import steady_fields
 
 if TYPE_CHECKING:
+    from mpm.fluxes import FluxOperator
     from mpm.reactor import Reactor
+    from mpm.transport import Transport
 
 Floats = NDArray[np.float64]
 CONVERGED = 1e-11  # sum of |residual| over the largest feed
@@ -61,7 +63,7 @@ class SteadyProblem(SteadySystem):
         self._start_from_coarser()
         start = self.concentration, self.theta
         try:
-            if not self._relax(LAST_STEP, TRIES):
+            if not self._relax(self.last_step, TRIES):
                 self.concentration, self.theta = start
                 self._pseudo_time()
         finally:
@@ -80,6 +82,8 @@ class SteadyProblem(SteadySystem):
             self._x, self._y = matrix.createVecs()
         self._y.array[:] = np.concatenate([gas.T.ravel(), coverage.T.ravel(), np.zeros(self.held)])
         self._solver.solve(self._y, self._x)
+        if any_rank(self.strip.comm, not np.isfinite(self._x.array).all()):
+            raise ConvergenceError("steady state: the solution of the linear system is not finite")
         gas_step, coverage_step = np.split(self._x.array[: self.local - self.held], [self.b * self.own])
         predicted = self.concentration - share * gas_step.reshape(self.own, self.b).T
         leaving = self.theta[: self.free, self.moving] - share * coverage_step.reshape(-1, self.free).T
@@ -121,12 +125,12 @@ class SteadyProblem(SteadySystem):
         step = FIRST_STEP
         self.old = self.concentration, self.theta
         while True:
-            last = step >= LAST_STEP
+            last = step >= self.last_step
             if self._relax(step, STEP_TRIES, CONVERGED if last else SETTLED):
                 if last:
                     return
                 self.old = self.concentration, self.theta
-                step = min((10.0 if step < FAR else FAR) * step, LAST_STEP)
+                step = min((10.0 if step < FAR else FAR) * step, self.last_step)
             else:
                 step /= 20.0
                 if step < SHORTEST_STEP or self.iterations > LIMIT:
@@ -146,7 +150,7 @@ class SteadyProblem(SteadySystem):
             problem.solve()
             prolong(problem, self)
             self.old = self.concentration, self.theta
-            self.sweep(LAST_STEP)
+            self.sweep(self.last_step)
         except ConvergenceError:
             pass  # a first guess is not worth an error
 
@@ -173,27 +177,67 @@ class SteadyProblem(SteadySystem):
         )
 
     def settle_accounts(self) -> None:
-        """Hand the state to the reactor's transport and bed, solve the species that are only made, and book one second of it."""
+        """Hand the state to the reactor's transport and bed, and book one second of it."""
         transport, bed = self.transport, self.bed
-        _, _, parts = self.residual(LAST_STEP)
-        events = parts["rates"] * transport.active_area
-        gas_events = parts["gas_rates"] * transport.gas_volume
+        _, _, parts = self.residual(self.last_step)
         transport.concentration[: self.b] = self.concentration
-        supply = transport.supply(self.operators, self.shares, {})
-        supply[:, bed.cells] += transport.nu_surface.T @ events
-        supply += transport.nu_gas.T @ gas_events
-        transport.concentration[self.b :] = steady_fields(
-            transport, self.operators[self.b :], supply[self.b :]
+        _settle(
+            transport,
+            self.operators,
+            self.shares,
+            parts["rates"] * transport.active_area,
+            parts["gas_rates"] * transport.gas_volume,
         )
-        drawn = transport.outlet_means(self.operators, transport.concentration)
-        transport.book(self.operators, 1.0, self.shares, drawn, events, gas_events)
         bed.theta = self.theta.copy()
         resting = transport.surface.part(self.resting)
         at_rest = self.concentration[:, bed.cells[self.resting]]
-        bed.theta[:, self.resting] = resting.coverage(at_rest, self.old[1][:, self.resting], LAST_STEP)
-        if len(self.moving) and not self.periodic:
+        bed.theta[:, self.resting] = resting.coverage(at_rest, self.old[1][:, self.resting], self.last_step)
+        if self.conveys and not self.periodic:
             entering = self.incoming()
             last, first = self.column == self.last, self.column == self.first
             carried = bed.capacity[self.moving] / self.residence
             gone = self.theta[:, self.moving][:, last] @ carried[last] - entering[:, first] @ carried[first]
             bed.passed = total(self.strip.comm, gone)
+
+
+class TracerProblem:
+    """The steady state where nothing is fed that reacts: linear, and solved with the accounts. Solids stay as they come in."""
+
+    iterations = 0
+
+    def __init__(self, reactor: Reactor, number: int):
+        self.transport, self.operators = reactor.transport, reactor.transport.operators(number)
+
+    def solve(self) -> None:
+        """Nothing to iterate on."""
+
+    def settle_accounts(self) -> None:
+        """Find the concentrations and book one second of them."""
+        transport = self.transport
+        none = np.zeros_like(transport.ledger.surface_events), np.zeros_like(transport.ledger.gas_events)
+        _settle(transport, self.operators, doses(transport), *none)
+
+
+def steady_problem(
+    reactor: Reactor, number: int, watch: Callable[[int, float], None]
+) -> SteadyProblem | TracerProblem:
+    """The problem of a reactor on its flow field `number`: nonlinear where gas that reacts comes in."""
+    transport = reactor.transport
+    coupled = len(transport.roles.coupled)
+    supply = transport.supply(transport.operators(number), doses(transport), {})[:coupled]
+    if any_rank(reactor.comm, bool(supply.any())):
+        return SteadyProblem(reactor, number, watch)
+    return TracerProblem(reactor, number)
+
+
+def _settle(
+    transport: Transport, operators: list[FluxOperator], shares: Floats, events: Floats, gas_events: Floats
+) -> None:
+    """Solve the species that do not react under `events` per second [mol/m/s] of surface and gas reactions; book one second."""
+    coupled = len(transport.roles.coupled)
+    supply = transport.supply(operators, shares, {})
+    supply[:, transport.bed.cells] += transport.nu_surface.T @ events
+    supply += transport.nu_gas.T @ gas_events
+    transport.concentration[coupled:] = steady_fields(transport, operators[coupled:], supply[coupled:])
+    drawn = transport.outlet_means(operators, transport.concentration)
+    transport.book(operators, 1.0, shares, drawn, events, gas_events)

@@ -7,7 +7,7 @@
 The coverage is integrated exactly along the bed: solids that cross a cell of width h at its concentration leave with
 theta_out = theta_in exp(-nu_s k C h/(|v_s| n_s)) (one reaction; `SurfaceKinetics.conveyed` for two). Unknowns are the concentrations of the
 reacting species, theta_out of every moving cell and, where outlets draw gas back in, what that gas holds: the mean of the cells next to
-each outlet. A storage term over a pseudo-time step [s] can be added; over LAST_STEP it is below rounding.
+each outlet. A storage term over a pseudo-time step [s] can be added; over the longest, `last_step`, it is negligible.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.cellmatrix import CellMatrix
-from mpm.errors import InputError
 from mpm.fem import PETSc
 from mpm.parallel import is_root, total
 from mpm.transport import stays_open
@@ -26,26 +25,24 @@ from mpm.transport import stays_open
 if TYPE_CHECKING:
     from mpm.fluxes import PortFlux
     from mpm.reactor import Reactor
+    from mpm.transport import Transport
 
 Floats = NDArray[np.float64]
-LAST_STEP = 1e12  # s, a pseudo-time step so long that storage over it is below rounding
+LAST_STEP = 1e12  # s, shortest last pseudo-time step
+STORED = 1e-10  # of the largest feed: what the solids at rest may still take up over the last step
 
 
 class SteadySystem:
     """Residual and Jacobian on the flow field `number` of the reactor's transport, and the coverage that follows from concentrations.
 
     `concentration` (coupled, own cells) [mol/m3]; `theta` (sites, reactive cells): leaving coverage where moving, own coverage at rest.
-    Raises InputError when nothing reacts.
+    At least one species that reacts is fed.
     """
 
     def __init__(self, reactor: Reactor, number: int):
         self.transport, self.bed, self.strip = reactor.transport, reactor.bed, reactor.strip
         transport, bed, strip = self.transport, self.bed, self.strip
         self.b, self.own = len(transport.roles.coupled), strip.owned
-        if self.b == 0:
-            raise InputError(
-                "fidelity: found steady, but no inlet feeds a species that reacts; accepted: averaged or resolved, or a feed"
-            )
         self.kinds = len(bed.theta)
         self.free = self.kinds - 1  # independent coverages of a moving cell
         speed, self.direction = abs(reactor.motion.mean), reactor.case.direction
@@ -58,6 +55,7 @@ class SteadySystem:
         self.place[bed.cells] = np.arange(len(bed.cells))
         self.place_moving = np.cumsum(self.is_moving) - 1  # of moving cells of `bed.cells` in `moving`
         self.residence = strip.grid.dx / speed if speed > 0.0 else np.inf
+        self.conveys = bool(moving_rows)  # on any rank
         self.periodic = bed.periodic
         self.operators = transport.operators(number)
         self.cells = CellMatrix(strip, self.b)
@@ -66,7 +64,9 @@ class SteadySystem:
         self.theta = bed.theta.copy()  # leaving coverage where moving, own coverage where at rest
         self.concentration = transport.concentration[: self.b].copy()
         self.old = (self.concentration.copy(), self.theta.copy())
-        self.shares = np.array([stays_open(inlet) for inlet in transport.case.geometry.inlets])
+        held = float(total(strip.comm, [bed.capacity[self.resting].sum()])[0])
+        self.last_step = max(LAST_STEP, held / (STORED * transport.feed_rate))
+        self.shares = doses(transport)
         self._matrix: PETSc.Mat | None = None
 
     def _number_unknowns(self) -> None:
@@ -250,7 +250,7 @@ class SteadySystem:
         In every cell theta_out = M theta_in with a stochastic M, so the coverage stays within [0, 1]. Periodic solids come in as they
         left: the fixed point of the product of all M.
         """
-        if not np.isfinite(self.residence):
+        if not self.conveys:
             return
         bed, surface, k = self.bed, self.transport.surface, self.kinds
         chosen = self.bed.cells[self.moving]
@@ -264,7 +264,7 @@ class SteadySystem:
         local = np.zeros((k * k + k, len(bed.cells)))
         local[: k * k, self.moving] = np.concatenate(columns)  # column by column
         local[k * k :, self.moving] = self.old[1][:, self.moving]
-        whole = bed.scatter.to_all(local).reshape(-1, len(bed.rows), bed.columns)[:, bed.moving_rows]
+        whole = bed.scatter.to_all(local).reshape(len(local), len(bed.rows), bed.columns)[:, bed.moving_rows]
         m = np.moveaxis(
             whole[: k * k].reshape(k, k, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0)
         )  # (columns, rows, out, in)
@@ -298,6 +298,11 @@ class SteadySystem:
         )
         parts = total(self.strip.comm, [np.abs(gas).sum(), sites.sum()])
         return float(parts.sum() / max(self.transport.feed_rate, 1e-300))
+
+
+def doses(transport: Transport) -> Floats:
+    """1 for every inlet that doses in the steady state, else 0, (inlets,)."""
+    return np.array([stays_open(inlet) for inlet in transport.case.geometry.inlets])
 
 
 def _fixed_point(m: Floats, aged: Floats, share: float, start: Floats) -> Floats:

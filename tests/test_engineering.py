@@ -259,7 +259,8 @@ def test_knudsen_number_of_the_pores(case: Case) -> None:
         ({"gas.molar_mass": "28.01 kg/mol"}, "gas.molar_mass is 28010 g/mol"),
         ({"gas.density": "0.7 g/m^3"}, "gas.density is 0.0007 kg/m3"),
         ({"gas.viscosity": "1.72e-5 g/cm/s"}, "gas.viscosity is 1.72e-06 Pa s"),
-        ({"gas.diffusivity": "0.288 m^2/s"}, "gas.diffusivity of TMA is 0.288 m2/s, in N2 at 473 K"),
+        ({"gas.diffusivity": "0.288 m^2/s"}, "gas.diffusivity of TMA, H2O, CH4, Al(OH)3 is 0.288 m2/s, in N2 at 473 K"),
+        ({"geometry.inlet.tma.mass_fractions.H2O": 1e-4}, "inlet tma feeds several precursors, TMA, H2O: its excess number"),
         ({"gas.carrier": "Q", "gas.molar_mass": "30 g/mol", "gas.viscosity": "2e-5 Pa s"}, "nothing is known of it in Q"),
     ],
 )  # fmt: skip

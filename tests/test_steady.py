@@ -3,18 +3,20 @@ the same on any number of ranks, and a failure that leaves something to look at.
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import mpm.coarsening
 import mpm.steady
-from mpm.case import Case
+from mpm.case import Case, load_case
 from mpm.cli import main
-from mpm.errors import InputError
+from mpm.errors import ConvergenceError
 from mpm.kinetics import phi1, phi2
 from mpm.reactor import Reactor
 from mpm.replay import Replay
+from mpm.results import load_run
 
 from .cases import (
     CASES,
@@ -263,10 +265,107 @@ def test_failure_leaves_the_last_iterate(
     assert "Newton stopped" in (tmp_path / "run" / "run.log").read_text()
 
 
-def test_nothing_to_react_is_refused() -> None:
-    """Fails when a steady case without any precursor ends otherwise than with a message that says so."""
-    with pytest.raises(InputError, match="no inlet feeds a species that reacts"):
-        Reactor(zone({**STEADY, TMA: 0.0}, TINY), MPI.COMM_SELF).run()
+def test_no_number_is_written_that_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Fails when a linear system without a solution ends otherwise than with ConvergenceError, or leaves NaN in a field or number."""
+    solve = mpm.steady.DirectSolver.solve
+
+    def spoilt(self: Any, rhs: Any, solution: Any) -> None:
+        solve(self, rhs, solution)
+        if self.name == "steady state":
+            solution.array[0] = np.nan
+
+    monkeypatch.setattr(mpm.steady.DirectSolver, "solve", spoilt)
+    case = zone({**STEADY, "geometry.bed_inflow": "periodic"}, TINY)
+    with pytest.raises(ConvergenceError, match="steady state: Newton stopped"):
+        Reactor(case, MPI.COMM_SELF).run(tmp_path / "run")
+    found = load_run(tmp_path / "run")
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["status"] == "failed"
+    assert all(np.isfinite(values).all() for values in found.snapshot().cell_data.values())
+    assert all(np.isfinite(values).all() for values in found.history.values())
+
+
+@pytest.mark.parallel
+def test_a_rank_without_a_part_of_the_bed() -> None:
+    """Fails (by timeout) when ranks wait for one that holds nothing of the moving bed, as under a high headspace."""
+    changes = {"geometry.layer.headspace.cells": 20, "geometry.layer.bed.cells": 1}
+    case = zone({**STEADY, "geometry.layer.headspace.height": "60 mm"}, {**TINY, **changes})
+    reactor, _ = run(case, MPI.COMM_WORLD)
+    mine = int(np.isin(reactor.bed.place, reactor.bed.moving_rows).sum())
+    if MPI.COMM_WORLD.size > 1:
+        assert MPI.COMM_WORLD.allreduce(mine, op=MPI.MIN) == 0, (
+            "every rank has some; another mesh would test it"
+        )
+
+
+GAS_ONLY = {
+    "fidelity": "steady",
+    "geometry": {
+        "length": "60 mm",
+        "cell_width": "2 mm",
+        "periodic": False,
+        "layer": [{"name": "gas", "height": "6 mm", "cells": 6}],
+        "inlet": [
+            {
+                "name": "i",
+                "center": "5 mm",
+                "width": "4 mm",
+                "velocity": "2 cm/s",
+                "mass_fractions": {"TMA": 1e-3},
+            }
+        ],
+        "outlet": [{"name": "o", "center": "55 mm", "width": "4 mm"}],
+    },
+}
+
+
+@pytest.mark.parallel
+def test_gas_without_solids() -> None:
+    """Fails when a strip of gas alone has no steady state, or one in which not all that is fed leaves, as it came in."""
+    _, result = run(load_case(GAS_ONLY), MPI.COMM_WORLD)
+    assert result.summary["species"]["TMA"]["left"] == pytest.approx(
+        result.summary["species"]["TMA"]["fed"], rel=1e-9
+    )
+    field = result.field("x_TMA")
+    np.testing.assert_allclose(field, field.max(), rtol=1e-9)  # one inlet: the same mixture everywhere
+
+
+@pytest.mark.parametrize("changes", [{}, RETURNS], ids=["", "drawn back in"])
+def test_a_tracer_alone(changes: dict) -> None:
+    """Fails when a gas that does not react has no steady state, or when that is not where an averaged run ends."""
+    fed = {"geometry.inlet.tma.mass_fractions": {"CH4": 1e-3}}
+    _, steady = run(zone({**changes, **fed, **STEADY}, TINY))
+    methane = steady.summary["species"]["CH4"]
+    assert methane["left"] == pytest.approx(methane["fed"], rel=1e-10)
+    assert steady.coverage("bed", "OH").min() == 1.0
+    late = {"time.end": "20000 s", "time.step": "100 s", "output.every": "20000 s"}
+    _, averaged = run(zone({**changes, **fed, **late}, TINY))
+    a, b = steady.field("C_CH4"), averaged.field("C_CH4")
+    np.testing.assert_allclose(b, a, rtol=0.0, atol=1e-6 * a.max())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {TMA: 0.0},
+        {"geometry.inlet.tma.stop": "5 s"},
+        {"geometry.inlet.tma.velocity": "0 m/s"},
+        {"geometry.inlet.tma.velocity": "0 m/s", "geometry.inlet.purge.velocity": "0 m/s"},
+    ],
+    ids=["no precursor", "closed for good", "no flow of it", "no flow at all"],
+)
+def test_nothing_is_dosed(changes: dict) -> None:
+    """Fails when a steady state in which no precursor comes in is not that: gas without it, solids as they were."""
+    _, result = run(zone({**STEADY, **changes}, TINY))
+    assert result.field("C_TMA").max() == 0.0
+    assert result.coverage("bed", "OH").min() == 1.0
+
+
+@pytest.mark.parametrize("dose", [1e-6, 1e-9])
+def test_traces(dose: float) -> None:
+    """Fails when the solids at rest still take up a part of a small dose in the last step of pseudo-time."""
+    _, result = run(zone({**STEADY, TMA: dose}, TINY))
+    titration, ratio = result.summary["titration"]["tma"], result.summary["dose_ratio"]["tma"]
+    assert titration["exit_mean"] == pytest.approx(ratio, rel=1e-9)
 
 
 def test_solids_that_stand_still() -> None:

@@ -68,7 +68,8 @@ def plan(sweep: Sweep) -> list[Point]:
     """Every point with its case, in order.
 
     A combination that the case refuses (a port beyond the strip, say) is a point with an error, for the table.
-    When the case refuses all of them, the sweep file is at fault: InputError.
+    When the case refuses all of them, or an axis changes nothing in it (the bed speed where a profile file rules), the
+    sweep file is at fault: InputError.
     """
     points = []
     for levels in combinations(sweep):
@@ -81,6 +82,26 @@ def plan(sweep: Sweep) -> list[Point]:
             points.append(Point(levels, numbers, refused[:12], None, str(error)))
         else:
             points.append(Point(levels, numbers, case.content_hash()[:12], case, ""))
+    _refuse_equal_cases(sweep, points)
     if all(point.case is None for point in points):
         raise InputError(f"{sweep.path}: every point is refused, the first: {points[0].error}")
     return points
+
+
+def _refuse_equal_cases(sweep: Sweep, points: list[Point]) -> None:
+    """Two points that differ in the table but not in their case would share a directory and show an effect that there is not."""
+    seen: dict[str, Point] = {}
+    for point in points:
+        other = seen.setdefault(point.name, point)
+        if other.numbers != point.numbers:
+            axes = [
+                f"{axis.name} = {first} and {second}"
+                for axis, first, second in zip(sweep.axes, other.levels, point.levels, strict=True)
+                if first != second
+            ]
+            raise InputError.at(
+                sweep.path,
+                "sweep.axis",
+                f"{', '.join(axes)}, which give the same case",
+                "axes that change the case",
+            )

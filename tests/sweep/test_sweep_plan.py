@@ -75,6 +75,18 @@ def test_a_grid_runs_through_its_last_axis_first_and_names_points_by_content(tmp
     assert len({point.name for point in points}) == 6
 
 
+def test_an_axis_without_effect_is_refused(tmp_path):
+    """Fails when a sweep over the bed speed runs although a profile file rules: its points would all be one case."""
+    rows = "".join(f"{phase},0.01,0,1\n" for phase in range(0, 360, 30))
+    (tmp_path / "p.csv").write_text(f"phase_deg,u_x_m/s,u_y_m/s,contact\n{rows}")
+    body = axis("motion.bed_velocity", 'values = ["1 cm/s", "2 cm/s"]')
+    fixed = f'[sweep.set]\n"motion.profile" = "{tmp_path / "p.csv"}"\n'
+    with pytest.raises(
+        InputError, match=r"motion.bed_velocity = 1 cm/s and 2 cm/s, which give the same case"
+    ):
+        plan(read_sweep(sweep_file(tmp_path, body + fixed)))
+
+
 def test_unquoted_fixed_overrides_are_the_same_as_quoted_ones(tmp_path):
     """Fails when TOML's nested reading of `time.end = ...` is not taken for the dotted key."""
     body = axis("motion.gamma", "values = [0.3]")
