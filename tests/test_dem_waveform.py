@@ -138,3 +138,63 @@ def test_bad_records_are_refused_in_one_line(tmp_path, text, message):
     with pytest.raises(InputError, match=message) as info:
         read_record(path)
     assert "\n" not in str(info.value) and "bad.csv" in str(info.value)
+
+
+def written(path, columns, separator=",", comma=False, header="t,a,b\n"):
+    """A record of 48 Hz with these columns' texts; decimal commas on request."""
+    rows = [separator.join(f"{value:.6f}" for value in row) for row in columns.T]
+    text = "\n".join(rows)
+    path.write_text(header + (text.replace(".", ",") if comma else text) + "\n")
+    return path
+
+
+@pytest.fixture
+def columns():
+    t = np.arange(400) / 4000.0
+    return np.array([t, 3.0 * np.cos(2 * np.pi * 48 * t), 5.5 * np.sin(2 * np.pi * 48 * t)])
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize("comma", [False, True])
+def test_decimal_commas_are_read_or_refused(tmp_path, columns, separator, comma):
+    """Fails when a decimal comma is taken for a separator, so that times or accelerations are wrong by powers of ten."""
+    path = written(tmp_path / "r.csv", columns, separator, comma, separator.join("tab") + "\n")
+    if comma and separator == ",":
+        with pytest.raises(InputError, match="decimal comma"):
+            read_record(path)
+        written(path, columns, separator, comma, "")
+        with pytest.raises(InputError, match="decimal comma"):
+            read_record(path)
+        return
+    record = read_record(path)
+    assert record.t[-1] == pytest.approx(columns[0, -1])
+    assert record.acceleration == pytest.approx(
+        columns[1:] - columns[1:].mean(axis=1, keepdims=True), abs=2e-6
+    )
+
+
+def test_quoted_and_mixed_decimal_marks(tmp_path, columns):
+    """Fails when quoted decimal commas are not read, or commas of thousands beside decimal points are read as decimals."""
+    path = tmp_path / "r.csv"
+    rows = [",".join('"' + f"{value:.6f}".replace(".", ",") + '"' for value in row) for row in columns.T]
+    path.write_text("t,a,b\n" + "\n".join(rows) + "\n")
+    assert read_record(path).t[-1] == pytest.approx(columns[0, -1])
+    for text in ("1,000.5", "1,000,000", "1_000"):
+        path.write_text("".join(f"{i};{text};2\n" for i in range(40)))
+        with pytest.raises(InputError, match="expected numbers"):
+            read_record(path)
+    path.write_text("".join(f"{i}.5;1,5;2\n" for i in range(40)))
+    with pytest.raises(InputError, match="decimal comma"):
+        read_record(path)
+
+
+def test_units_of_a_header_hold(tmp_path, columns):
+    """Fails when milliseconds are read as seconds, or a header that contradicts the unit given is passed over."""
+    scaled = columns * np.array([[1e3], [1.0], [1.0]])
+    record = read_record(written(tmp_path / "r.csv", scaled, header="time (ms),a_y,a_z\n"))
+    assert record.t[-1] == pytest.approx(columns[0, -1])
+    for header, unit in (("t [s],a_y [g],a_z [g]\n", "m/s^2"), ("t,a_y_m/s2,a_z_m/s2\n", "g")):
+        path = written(tmp_path / "r.csv", columns, header=header)
+        with pytest.raises(InputError, match="the header says"):
+            read_record(path, unit)
+        assert len(read_record(path, "g" if unit == "m/s^2" else "m/s^2").t) == 400

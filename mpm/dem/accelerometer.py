@@ -1,5 +1,8 @@
 """From accelerometer data (CSV of t, a_y, a_z) to the few harmonics that describe the conveyor (seed 2.3.3)."""
 
+import csv
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,42 +42,93 @@ class Record:
 
 
 def read_record(path: Path, unit: str = "m/s^2") -> Record:
-    """Read columns t [s], a_y, a_z (`unit` m/s^2 or g); a header line and uneven or unsorted samples are allowed."""
+    """Read columns t, a_y, a_z (`unit` m/s^2 or g), separated by commas, semicolons or tabs; samples may be uneven or unsorted.
+
+    Up to two header lines are allowed. Times are seconds unless the header says ms or us; a unit of the accelerations in
+    the header must be `unit`. Decimal commas are read where the columns are separated by something else.
+    """
     scale = {"m/s^2": 1.0, "m/s2": 1.0, "g": GRAVITY}.get(unit)
     if scale is None:
         raise InputError(f"{path}: unit of acceleration: found {unit!r}, accepted m/s^2 or g")
     try:
-        lines = [line for line in read_text(path).splitlines() if line.strip()]
+        lines = read_text(path).splitlines()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines):
-        if line.lstrip().startswith("#"):
-            continue
-        try:
-            values = [float(v) for v in line.replace(";", ",").split(",")[:3]]
-        except ValueError:
-            if not rows and number < 2:
-                continue  # header
-            raise InputError(
-                f"{path}: line {number + 1}: found {line[:40]!r}, expected numbers t,a_y,a_z"
-            ) from None
-        if len(values) < 3:
-            raise InputError(f"{path}: line {number + 1}: found {len(values)} columns, expected t,a_y,a_z")
-        rows.append(values)
-    data = np.array(rows)
-    if len(rows) < 16:
-        raise InputError(f"{path}: found {len(rows)} samples, at least 16 are needed")
+    header, data = _columns(path, lines)
+    if len(data) < 16:
+        raise InputError(f"{path}: found {len(data)} samples, at least 16 are needed")
     if not np.isfinite(data).all():
         raise InputError(f"{path}: found a number that is not finite")
+    count = len(data)
     _, order = np.unique(data[:, 0], return_index=True)
     data = data[order]
-    if len(order) < 16:
-        raise InputError(f"{path}: found {len(order)} distinct times, at least 16 are needed")
-    acceleration = scale * (data[:, 1:] - data[:, 1:].mean(axis=0)).T
-    return Record(data[:, 0] - data[0, 0], acceleration)
+    if len(order) < max(16, count / 2):
+        raise InputError(
+            f"{path}: found {len(order)} distinct times in {count} samples, at least 16 and half of them are needed"
+        )
+    found = _said_unit(header)
+    if found is not None and (found == "g") != (unit == "g"):
+        raise InputError(f"{path}: the header says {found}, the unit given is {unit}: make them agree")
+    t = (data[:, 0] - data[0, 0]) * _time_scale(header)
+    return Record(t, scale * (data[:, 1:] - data[:, 1:].mean(axis=0)).T)
+
+
+def _columns(path: Path, lines: Sequence[str]) -> tuple[list[str], np.ndarray]:
+    """The cells of the last header line (none: empty) and the first three columns as numbers (n, 3)."""
+    kept = [
+        (i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
+    ]
+    separator = next((mark for mark in "\t;" if any(mark in line for _, line in kept)), ",")
+    header: list[str] = []
+    rows: list[list[float]] = []
+    marks: set[str] = set()  # decimal marks met
+    for number, line in kept:
+        cells = [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+        while cells and not cells[-1]:
+            cells.pop()
+        try:
+            values = [_number(cell) for cell in cells[:3]]
+        except ValueError:
+            if not rows and number < 3:
+                header = cells
+                continue
+            raise InputError(
+                f"{path}: line {number}: found {line[:40]!r}, expected numbers t,a_y,a_z"
+            ) from None
+        marks |= {mark for cell in cells[:3] for mark in ",." if mark in cell}
+        split_numbers = separator == "," and len(cells) > 5 and not marks
+        if split_numbers or (header and len(cells) == 2 * len(header)) or marks == {",", "."}:
+            raise InputError(
+                f"{path}: line {number}: found {line[:40]!r}, where a comma may be a decimal comma; accepted: decimal points, "
+                "or columns separated by semicolons or tabs"
+            )
+        if len(values) < 3:
+            raise InputError(
+                f"{path}: line {number}: found {len(values)} columns, expected t,a_y,a_z separated by commas, semicolons or tabs"
+            )
+        rows.append(values)
+    return header, np.array(rows).reshape(-1, 3)
+
+
+def _number(cell: str) -> float:
+    """A number with a decimal point or a decimal comma. Raises ValueError, also for separators of thousands."""
+    if "_" in cell or ("," in cell and ("." in cell or cell.count(",") > 1)):
+        raise ValueError
+    return float(cell.replace(",", "."))
+
+
+def _time_scale(header: Sequence[str]) -> float:
+    """Seconds in the unit of time that a header names, 1 where it names none."""
+    found = re.search(r"(?<![A-Za-z])(ms|us|\u00b5s|\u03bcs)(?![A-Za-z])", header[0]) if header else None
+    return 1.0 if found is None else 1e-3 if found[1] == "ms" else 1e-6
+
+
+def _said_unit(header: Sequence[str]) -> str | None:
+    """The unit of the accelerations that a header names in brackets or after an underscore."""
+    found = re.search(r"[\[(_](g|m/s)(?![A-Za-z])", " ".join(header[1:3]))
+    return None if found is None else "g" if found[1] == "g" else "m/s^2"
 
 
 def resample(t: np.ndarray, signal: np.ndarray) -> tuple[float, np.ndarray]:

@@ -5,19 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from ..constants import GRAVITY
+from .bed import bed_numbers
 from .box import BoxSpec
 from .case import DemCase
-from .cohesion import largest_force
 from .profile import PiecewiseFit, Profile, piecewise_fit
 from .relations import (
     efficiency,
-    granular_bond_number,
-    minimum_fluidisation_velocity,
     perfect_flight_velocity,
     straight_drop_velocity,
     throw_number,
-    wen_yu_minimum_fluidisation,
 )
 from .waveform import Waveform, extension_velocity, peak_displacement
 
@@ -219,7 +215,8 @@ def _summary(
     bulk = flight_interval(results.curve.phase, results.rise, LIFTED * powder.diameter)
     layers = flight_interval(results.curve.phase, results.gap, OPEN_GAP * powder.diameter)
     criterion = acceleration_liftoff(results.curve, results.base, period)
-    x, z = peak_displacement(waveform)
+    x, _ = peak_displacement(waveform)
+    downward = -float(waveform.acceleration(np.linspace(0.0, period, 4097))[1].min())
     d_one = np.mean([self_diffusivity(r, run.discard, period) for r in records], axis=0)
     kept = run.cycles - run.discard
     d_long = np.mean([self_diffusivity(r, run.discard, period, kept) for r in records], axis=0)
@@ -228,6 +225,7 @@ def _summary(
     )
     finite = results.residence[np.isfinite(results.residence)]
     flying = results.curve.contact < 0.5
+    retracting = results.base[0] < 0.0
     pairs = results.coordination
     on_base = np.mean([r["on_base"][run.discard * run.samples_per_cycle :].mean() for r in records])
     return {
@@ -243,7 +241,8 @@ def _summary(
             "straight_drop": straight_drop_velocity(x, waveform.frequency),
             "perfect_flight": extension_velocity(waveform),
             "perfect_flight_of_a_sine": perfect_flight_velocity(x, waveform.frequency),
-            "throw_number": throw_number(z, waveform.frequency, case.box.declination),
+            "throw_number": throw_number(downward, case.box.declination),
+            "gamma": throw_number(downward),
         },
         "liftoff": {
             "phase_deg": bulk[0] if bulk else None,
@@ -260,6 +259,7 @@ def _summary(
             "contacts_per_particle": float(pairs.mean()),
             "in_contact": float(pairs[~flying].mean()) if (~flying).any() else None,
             "in_flight": float(pairs[flying].mean()) if flying.any() else None,
+            "in_retraction": float(pairs[retracting].mean()) if retracting.any() else None,
             "seed_definition": float(pairs.mean() / 4.0),
             "share_on_base": float(on_base),
         },
@@ -275,7 +275,7 @@ def _summary(
             "median": float(np.median(results.residence)) if np.isfinite(np.median(results.residence)) else None,
             "share_not_advancing": float(1.0 - len(finite) / len(results.residence)),
         },
-        "bed": _bed(case, spec, results),
+        "bed": bed_numbers(case, spec, results.heights, results.solid),
         "fit": {
             "liftoff_deg": results.fit.liftoff,
             "contact_deg": results.fit.contact,
@@ -283,25 +283,3 @@ def _summary(
             "rms": results.fit.rms,
         },
     }  # fmt: skip
-
-
-def _bed(case: DemCase, spec: BoxSpec, results: Results) -> dict[str, Any]:
-    """Voidage of the bed at its densest phase, granular Bond numbers of the real material, minimum fluidisation."""
-    powder = spec.powder
-    gas = case.gas
-    d = powder.diameter
-    core = (results.heights > 2.0 * d) & (results.heights < 0.7 * case.box.height * d)
-    porosity = 1.0 - float(results.solid[:, core].mean(axis=1).max()) if core.any() else None
-    out: dict[str, Any] = {"porosity": porosity, "measured_minimum_fluidisation": powder.measured_umf}
-    for name, hamaker, radius in (("pair", powder.hamaker, d / 4.0), ("base", powder.wall_hamaker, d / 2.0)):
-        force = largest_force(hamaker, radius, powder.asperity) if case.box.cohesion else 0.0
-        out[f"bond_number_{name}"] = granular_bond_number(force, d, powder.density)
-    if gas is not None and porosity is not None:
-        out["minimum_fluidisation_ergun"] = minimum_fluidisation_velocity(
-            d, powder.sphericity, powder.density, porosity, gas.viscosity, gas.density, *powder.ergun
-        )
-        out["minimum_fluidisation_wen_yu"] = wen_yu_minimum_fluidisation(
-            d, powder.density, gas.viscosity, gas.density
-        )
-    out["weight_of_a_particle"] = powder.mass * GRAVITY
-    return out

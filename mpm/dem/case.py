@@ -36,9 +36,9 @@ from mpm.units import (
 
 from ..constants import GRAVITY
 from .accelerometer import fit_record, read_record
-from .powder import POWDERS, Powder
+from .powder import POWDERS, SMALLEST, Powder
 from .reading import one_line, set_dotted
-from .relations import ideal_gas_density
+from .relations import ideal_gas_density, mean_free_path
 from .waveform import Harmonic, HarmonicWaveform, Sawtooth, Waveform, from_table, seed_table_2_2, sine
 
 MOST_SEEDS = 10_000
@@ -215,6 +215,9 @@ class GasInput(Section):
 
     `frame = "lab"` is the seed's boundary condition (its inlet does not vibrate): the gas stands still while the
     bed moves through it, which is what lifts fine powders. `"reactor"`: the gas column moves with the conveyor.
+
+    `molar_mass`, `temperature` and `pressure` enter the density, that is the inertial part of the drag, and the mean free
+    path; the viscosity is given and follows none of them.
     """
 
     velocity: Speed = 0.0
@@ -227,6 +230,11 @@ class GasInput(Section):
     @property
     def density(self) -> float:
         return ideal_gas_density(self.molar_mass, self.temperature, self.pressure)
+
+    @property
+    def mean_free_path(self) -> float:
+        """Mean free path of the gas [m]."""
+        return mean_free_path(self.viscosity, self.pressure, self.temperature, self.molar_mass)
 
 
 class RunInput(Section):
@@ -292,6 +300,19 @@ class DemCase(Section):
             and self.box.baffle_width > self.box.length * self.build_powder().diameter
         ):
             raise reject(f"{self.box.baffle_width:g} m", "up to box.length", key="box.baffle_width")
+        return self
+
+    @model_validator(mode="after")
+    def sizes_keep_the_mean(self) -> "DemCase":
+        powder, count = self.build_powder(), self.box.size_classes
+        largest = powder.largest_deviation(count)
+        if powder.deviation > largest:
+            raise reject(
+                f"{powder.deviation * 1e6:.4g} um beside a mean diameter of {powder.diameter * 1e6:.4g} um in {count} size classes, "
+                f"of which the smallest would lie below {SMALLEST:g} of the mean",
+                f"up to {largest * 1e6:.4g} um, or fewer classes (box.size_classes)",
+                key="powder.deviation",
+            )
         return self
 
     def build_powder(self) -> Powder:

@@ -8,6 +8,8 @@ import numpy as np
 
 from ..constants import GRAVITY
 
+SMALLEST = 0.2  # of the mean diameter: the smallest class; its collisions set the time step
+
 
 @dataclass(frozen=True)
 class Powder:
@@ -51,16 +53,25 @@ class Powder:
         """Diameters [m] of `count` equally frequent classes of the normal size distribution, shape (count,).
 
         Each is the mean of its quantile interval, stretched so that the standard deviation of the classes is
-        the powder's (few classes would otherwise lose the tails). One class: the mean diameter.
+        the powder's (few classes would otherwise lose the tails). One class: the mean diameter. Positive up to
+        `largest_deviation`.
         """
         if count == 1 or self.deviation == 0.0:
             return np.array([self.diameter])
-        normal = NormalDist()
-        # Mean of a standard normal between two quantiles: count * (pdf(lower) - pdf(upper)).
-        edges = [0.0, *(normal.pdf(normal.inv_cdf(i / count)) for i in range(1, count)), 0.0]
-        score = count * (np.array(edges[:-1]) - np.array(edges[1:]))
-        sizes = self.diameter + self.deviation * score / score.std()
-        return np.maximum(sizes, 0.2 * self.diameter)
+        return self.diameter + self.deviation * class_scores(count)
+
+    def largest_deviation(self, count: int) -> float:
+        """Standard deviation [m] up to which `count` classes keep mean and spread: the smallest is `SMALLEST` of the mean."""
+        return (1.0 - SMALLEST) * self.diameter / float(class_scores(count).max()) if count > 1 else math.inf
+
+
+def class_scores(count: int) -> np.ndarray:
+    """Sizes of `count` > 1 equally frequent classes of a standard normal distribution: mean 0, standard deviation 1."""
+    normal = NormalDist()
+    # Mean of a standard normal between two quantiles: count * (pdf(lower) - pdf(upper)).
+    edges = [0.0, *(normal.pdf(normal.inv_cdf(i / count)) for i in range(1, count)), 0.0]
+    score = count * (np.array(edges[:-1]) - np.array(edges[1:]))
+    return score / score.std()
 
 
 _GLASS = (
