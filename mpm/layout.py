@@ -47,9 +47,10 @@ RESERVED_LAYERS = ("height",)
 """Names beside those of layers under `front.INLET` in the results."""
 MOST_CELLS = 100_000_000
 """A mesh beyond this is a slip of the unit, not a plan."""
-
-THINNEST = 1e-9
-"""Share of the strip's height that a row needs at least: edges closer to each other are lost in rounding."""
+STEEPEST = 100.0
+"""Grading, or one over it, up to which gmsh places the rows of a layer where they belong (to 1e-4 of a row)."""
+FINEST = 1e-7
+"""Smallest side of a cell over the longer side of the strip that coordinates in double precision resolve as well."""
 
 _INSTANT = Dimension("s", "a time", "5 s", at_least=0.0)
 _DEADLINE = Dimension("s", "a time", "5 s", above=0.0, infinite=True)
@@ -103,7 +104,7 @@ def only_name_required(schema: dict[str, Any]) -> None:
 
 
 class Layer(Frozen):
-    """A horizontal layer, `cells` rows high; `grading` is the height of its top row over that of its bottom row.
+    """A horizontal layer, `cells` rows high; `grading` (0.01 to 100) is the height of its top row over that of its bottom row.
 
     `material` (a Material; None: gas) is resolved by the case from the name that the file gives.
     """
@@ -252,15 +253,7 @@ class Geometry(Frozen):
         cells = self.columns * sum(layer.cells for layer in self.layers)
         if cells > MOST_CELLS:
             raise reject(f"{cells:.2g} cells", f"a mesh of at most {MOST_CELLS:.0e} cells", key="cell_width")
-        height = sum(layer.height for layer in self.layers)
-        for layer in self.layers:
-            thinnest = layer.height / layer.cells / max(layer.grading, 1.0 / layer.grading)
-            if thinnest < THINNEST * height:
-                raise reject(
-                    f"rows of about {thinnest:.2g} m in a strip {height:.3g} m high",
-                    f"rows of at least {THINNEST:g} of its height",
-                    key=f"layer.{layer.name}.height",
-                )
+        self._check_sizes()
         _check_names("layer", self.layers)
         _check_names("port", (*self.inlets, *self.outlets))
         _check_names("zone", self.zones)
@@ -290,6 +283,31 @@ class Geometry(Frozen):
             self.__dict__["zones"] = self._default_zones()
         self._check_zones()
         return self
+
+    def _check_sizes(self) -> None:
+        """Rows and columns must be such as a mesh can have."""
+        longest = max(self.length, sum(layer.height for layer in self.layers))
+        for layer in self.layers:
+            steepness = max(layer.grading, 1.0 / layer.grading)
+            if steepness > STEEPEST:
+                raise reject(
+                    f"{layer.grading:g}",
+                    f"{1.0 / STEEPEST:g} to {STEEPEST:g}",
+                    key=f"layer.{layer.name}.grading",
+                )
+            row = layer.height / layer.cells / steepness
+            if row < FINEST * longest:
+                raise reject(
+                    f"rows of {row:.2g} m in a strip of {longest:.2g} m",
+                    f"rows above {FINEST * longest:.2g} m",
+                    key=f"layer.{layer.name}.height",
+                )
+        if self.dx < FINEST * longest:
+            raise reject(
+                f"columns of {self.dx:.2g} m in a strip of {longest:.2g} m",
+                f"columns above {FINEST * longest:.2g} m",
+                key="cell_width",
+            )
 
     def _check_side(self, ports: Sequence[_Port]) -> None:
         """Ports on one side may not overlap, and an outlet may not share a facet (a column) with another port."""

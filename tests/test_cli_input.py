@@ -77,6 +77,16 @@ BROKEN: dict[str, tuple[Edits, str, str]] = {
         "a whole number",
     ),
     "grading of zero": (swap("cells = 38", "cells = 38\ngrading = 0"), "headspace.grading", "above 0"),
+    "grading that no mesh has": (
+        swap("cells = 38", "cells = 38\ngrading = 1000"),
+        "geometry.layer.headspace.grading",
+        "0.01 to 100",
+    ),
+    "rows too thin for a mesh": (
+        swap('"12.7 mm"', '"1 nm"'),
+        "geometry.layer.headspace.height",
+        "rows above",
+    ),
     "text for a switch": (swap("periodic = true", 'periodic = "yes"'), "geometry.periodic", "true or false"),
     "number for text": (swap('"N2"', "28"), "gas.carrier", "text in quotes"),
     "text for a section": (swap("[geometry]", 'transport = "slow"\n[geometry]'), "transport", "a table"),

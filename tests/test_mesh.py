@@ -32,6 +32,23 @@ def test_gmsh_gives_the_grid() -> None:
     assert np.array_equal(quads.layer, grid.row_layer[row])
 
 
+@pytest.mark.parametrize(
+    ("height", "grading", "rows"),
+    [
+        ("12.7 mm", 100.0, 2),
+        ("12.7 mm", 100.0, 10),
+        ("12.7 mm", 100.0, 100),
+        ("12.7 mm", 0.01, 10),
+        ("30 nm", 1.0, 2),
+    ],
+)
+def test_what_a_case_accepts_can_be_meshed(height: str, grading: float, rows: int) -> None:
+    """Fails when a layer at the limits of what is accepted, steep or thin, is refused when the run has begun."""
+    layer = "geometry.layer.headspace"
+    case = zone({f"{layer}.height": height, f"{layer}.grading": grading, f"{layer}.cells": rows}, TINY)
+    assert len(build_mesh(case).cells) == Grid.from_case(case).cells
+
+
 @pytest.mark.parametrize("case", [zone(), cycle(), zone(mesh=GRADED)], ids=["zone", "cycle", "graded"])
 def test_ports_are_named_groups(case) -> None:
     """Fails when the group of a port misses a facet that the port covers in part, or holds one it does not touch."""
