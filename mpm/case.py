@@ -198,9 +198,11 @@ class Motion(Frozen):
                 "an angle from 0 deg to 90 deg that leaves a vertical component",
                 key="angle",
             )
-        if self.gamma == 0.0:
-            return self
-        if self.profile == "thesis":
+        if self.profile not in ("thesis", "phases"):
+            self._read_table()
+        elif self.gamma == 0.0:
+            pass  # nothing hops: a preset has no phases to check
+        elif self.profile == "thesis":
             peak = self.peak_vertical_velocity
             if not -peak < self.liftoff_velocity < 0.0:
                 raise reject(
@@ -208,7 +210,7 @@ class Motion(Frozen):
                     f"between 0 m/s and the reactor's peak velocity, {-peak:.4g} m/s",
                     key="liftoff_velocity",
                 )
-        elif self.profile == "phases":
+        else:
             for key in ("liftoff_phase", "contact_phase"):
                 value = getattr(self, key)
                 if value is None or not 0.0 <= value < 2.0 * math.pi:
@@ -219,16 +221,22 @@ class Motion(Frozen):
                     )
             if self.liftoff_phase == self.contact_phase:
                 raise reject("the phase of lift-off", "another phase", key="contact_phase")
-        else:
-            self._table = read_profile(Path(self.profile), "profile")
-            made = self._table.conditions
-            if made is not None and abs(made.frequency - self.frequency) > SAME_FREQUENCY * self.frequency:
-                raise reject(
-                    f"{self.profile}: a profile made at {made.frequency:.6g} Hz for a vibration at {self.frequency:.6g} Hz",
-                    f'a profile made at {self.frequency:.6g} Hz, or frequency = "{made.frequency:.6g} Hz"',
-                    key="profile",
-                )
         return self
+
+    def _read_table(self) -> None:
+        """Read the profile file; it must be one even where nothing vibrates, and of this frequency where something does."""
+        table = read_profile(Path(self.profile), "profile")
+        if self.gamma == 0.0:
+            return
+        made = table.conditions
+        if made is not None and abs(made.frequency - self.frequency) > SAME_FREQUENCY * self.frequency:
+            raise reject(
+                f"{self.profile}: a profile made at {made.frequency:.6g} Hz for a vibration at {self.frequency:.6g} Hz, in whose cycle its "
+                "bed would hop to another beat",
+                f'a profile made at {self.frequency:.6g} Hz, or frequency = "{made.frequency:.6g} Hz"',
+                key="profile",
+            )
+        self._table = table
 
     @model_serializer(mode="wrap")
     def _write_what_rules(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from mpm.diffusion import carrier_ratio, scaled_diffusivity
 from mpm.elements import formula_mass
 from mpm.gases import CARRIERS, ideal_gas_density
+from mpm.mechanism import parse_formula
 
 if TYPE_CHECKING:
     from mpm.case import Case
@@ -133,10 +134,11 @@ def mass_caveats(case: Case) -> list[str]:
             formula = formula_mass(part.elements)
             if part.molar_mass is not None and formula is not None:
                 found += _wrong_mass(f"chemistry.{kind}.{part.name}.molar_mass", part.molar_mass, formula)
-    model = CARRIERS.get(case.gas.carrier)
-    if model is not None:
-        found += _wrong_mass("gas.molar_mass", case.gas.molar_mass, model.molar_mass)
-    return found
+    try:
+        carrier = formula_mass(parse_formula(case.gas.carrier))
+    except ValueError:  # a name that is no formula
+        carrier = None
+    return found if carrier is None else found + _wrong_mass("gas.molar_mass", case.gas.molar_mass, carrier)
 
 
 def _wrong_mass(key: str, found: float, expected: float) -> list[str]:

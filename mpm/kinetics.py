@@ -256,7 +256,10 @@ class SurfaceKinetics:
 
 
 class GasKinetics:
-    """Second-order gas reactions among the coupled species: rate k(T) C_1 C_2 [mol per m3 of gas per s]."""
+    """Second-order gas reactions among the coupled species: rate k(T) C_1 C_2 [mol per m3 of gas per s].
+
+    Per total volume that is eps k C_1 C_2; the thesis (5-12) prints the source in its porous zones without eps.
+    """
 
     def __init__(self, mechanism: Mechanism, coupled: tuple[str, ...], temperature: ArrayLike):
         self.coupled = coupled

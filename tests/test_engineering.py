@@ -257,6 +257,7 @@ def test_knudsen_number_of_the_pores(case: Case) -> None:
         ({"chemistry.site.OH.molar_mass": "17 kg/mol"}, "chemistry.site.OH.molar_mass"),
         ({"chemistry.film.Al2O3.molar_mass": "26.98 g/mol"}, "chemistry.film.Al2O3.molar_mass"),
         ({"gas.molar_mass": "28.01 kg/mol"}, "gas.molar_mass is 28010 g/mol"),
+        ({"gas.carrier": "H2", "gas.molar_mass": "2.016 kg/mol", "gas.viscosity": "1e-5 Pa s"}, "gas.molar_mass is 2016 g/mol"),
         ({"gas.density": "0.7 g/m^3"}, "gas.density is 0.0007 kg/m3"),
         ({"gas.viscosity": "1.72e-5 g/cm/s"}, "gas.viscosity is 1.72e-06 Pa s"),
         ({"gas.diffusivity": "0.288 m^2/s"}, "gas.diffusivity of TMA, H2O, CH4, Al(OH)3 is 0.288 m2/s, in N2 at 473 K"),

@@ -205,6 +205,10 @@ def test_mean_velocity_is_that_of_what_moves_the_bed(tmp_path: Path) -> None:
         and BedMotion(motion).mean == motion.mean_velocity
     )
     assert "bed_velocity" not in motion.model_dump(mode="json")
+    with pytest.raises(
+        ValueError, match="no such file"
+    ):  # nothing vibrates, but a run keeps the file's content with its state
+        Motion.model_validate({"gamma": 0.0, "profile": str(tmp_path / "none.csv")})
     still = Motion.model_validate({"gamma": 0.0, "profile": path, "bed_velocity": "5 cm/s"})
     assert still.mean_velocity == BedMotion(still).mean == 0.05
     assert (
