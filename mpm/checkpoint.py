@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from mpm.caseio import read_toml
 from mpm.diagnostics import Totals
 from mpm.errors import InputError
+from mpm.files import read_text
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, on_root, total
 from mpm.replay import March, Replay, unpack
@@ -47,7 +47,7 @@ def identity(case: Case) -> dict[str, Any]:
 
 
 def _profile(name: str) -> str:
-    return name if name in ("thesis", "phases") else _digest(Path(name).read_text(encoding="utf-8"))
+    return name if name in ("thesis", "phases") else _digest(read_text(name))
 
 
 def _digest(text: str) -> str:

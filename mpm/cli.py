@@ -1,6 +1,6 @@
 """The command line, `mpm` or `python -m mpm`, serially or under mpirun.
 
-Exit status: 0 done, 2 bad input, 3 numerical failure, 130 interrupted; 1 for a defect of mpm, with a traceback.
+Exit status: 0 done, 2 bad input, 3 numerical failure or a full disk, 130 interrupted; 1 for a defect of mpm, with a traceback.
 Input is checked by every rank before MPI is loaded, so that bad input ends all of them alike; only one speaks.
 """
 
@@ -20,7 +20,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from mpm.errors import InputError, Interrupted, MpmError, printable
+from mpm.errors import InputError, Interrupted, MpmError, printable, storage_error
 from mpm.launcher import rank
 from mpm.screen import screen, spell_out
 
@@ -280,8 +280,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except BrokenPipeError:  # the reader of our output has gone; let nothing more reach the pipe
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
-        except Exception:
-            _crash()
+        except Exception as error:
+            said = storage_error(error) if isinstance(error, OSError) else None
+            if said is None:
+                _crash()
+            return _end(said.exit_status, str(said))
 
 
 _USAGE_ERROR: Any = typer.BadParameter.__base__

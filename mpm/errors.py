@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -65,6 +66,12 @@ class BalanceError(ConvergenceError):
     """What came in, went out, reacted and stayed does not add up; the message says of what and by how much."""
 
 
+class StorageError(MpmError):
+    """The disk is full, or failing. What was written before is whole, and `--resume` works when there is room again."""
+
+    exit_status = 3
+
+
 class Interrupted(MpmError):
     """The run was asked to stop (Ctrl-C, SIGTERM); what was written is usable and `--resume` continues it."""
 
@@ -77,6 +84,20 @@ def printable(text: str) -> str:
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in line
     )
+
+
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+_CLOSED = {
+    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.EISDIR, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP, errno.ESTALE,
+}  # fmt: skip
+
+
+def storage_error(error: OSError) -> MpmError | None:
+    """What a user is told of a file that could not be read or written; None where `error` is a defect."""
+    line = f"{error.filename}: {error.strerror}" if error.filename else f"mpm: {error.strerror}"
+    if error.errno in FULL:
+        return StorageError(line)
+    return InputError(line) if error.errno in _CLOSED and error.filename else None
 
 
 def nearest(given: str, known: Iterable[str]) -> str | None:

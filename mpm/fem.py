@@ -6,10 +6,16 @@ The PyPI wheel `dolfinx-solver-real` must be imported as `dolfinx_solver` before
 
 from __future__ import annotations
 
+import functools
 import os
-from contextlib import suppress
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
+from pathlib import Path
+from textwrap import shorten
+from typing import Any
 
-from mpm.errors import MpmError
+from mpm.errors import FULL, InputError, MpmError
+from mpm.files import lock
 
 # PETSc would take SIGTERM and SIGPIPE away from Python
 os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler".strip()
@@ -18,7 +24,9 @@ with suppress(ModuleNotFoundError):
     import dolfinx_solver  # noqa: F401
 
 try:
+    import cffi
     import dolfinx.fem.petsc
+    import ffcx.codegeneration.jit
     from petsc4py import PETSc
 except ModuleNotFoundError as missing:
     raise MpmError(
@@ -28,4 +36,72 @@ except ModuleNotFoundError as missing:
 if PETSc.ScalarType is not PETSc.RealType:
     raise MpmError("this PETSc is built for complex numbers; mpm needs the real one (dolfinx-solver-real)")
 
-__all__ = ["PETSc", "dolfinx"]
+__all__ = ["PETSc", "check_cache", "dolfinx"]
+COMPILING = 300.0  # seconds to wait for another process that compiles
+
+
+def cache_directory() -> Path:
+    """Where compiled forms are kept: mpm's own part of dolfinx's cache. Raises InputError when there is no home to look in."""
+    try:
+        return Path(dolfinx.jit.get_options()["cache_dir"]) / "mpm"
+    except (OSError, RuntimeError) as error:
+        raise InputError(
+            f"the home directory cannot be read ({error}); set HOME, or XDG_CACHE_HOME and XDG_CONFIG_HOME"
+        ) from error
+
+
+def check_cache() -> None:
+    """Raise InputError when compiled forms can be neither kept nor found; call it before the first form, where ranks can still agree."""
+    path = cache_directory()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        if error.errno in FULL:
+            raise
+        raise InputError(
+            f"{path}: cannot keep compiled equations here ({error.strerror}); set XDG_CACHE_HOME to a directory with write access"
+        ) from error
+    if not os.access(path, os.W_OK) and not any(path.glob("*.c.cached")):
+        raise InputError(
+            f"{path}: cannot keep compiled equations here (no write access); set XDG_CACHE_HOME to a directory with write access"
+        )
+
+
+def one_at_a_time(compile_forms: Callable[..., Any]) -> Callable[..., Any]:
+    """ffcx's compiler, one process at a time in mpm's cache.
+
+    ffcx marks a form as taken by its .c file and as ready by its .c.cached; whoever finds the first alone waits for the second. A process
+    that was killed in between would make all later ones wait in vain. Under the lock nobody is in between: such files are left over, and
+    removed.
+    """
+
+    @functools.wraps(compile_forms)
+    def compile_here(forms: Any, options: Any = None, cache_dir: Any = None, **rest: Any) -> Any:
+        cache = cache_directory()
+        with lock(cache / "lock", COMPILING) if os.access(cache, os.W_OK) else nullcontext():
+            for source in cache.glob("*.c"):
+                if not source.with_suffix(".c.cached").exists():
+                    source.unlink(missing_ok=True)
+            return compile_forms(forms, options=options, cache_dir=cache, **rest)
+
+    return compile_here
+
+
+def reported(jit: Callable[..., Any]) -> Callable[..., Any]:
+    """dolfinx's compiler with one line for what keeps forms from being compiled, the same on every rank."""
+
+    @functools.wraps(jit)
+    def compile_reported(*arguments: Any, **options: Any) -> Any:
+        try:
+            return jit(*arguments, **options)
+        except (RuntimeError, TimeoutError, cffi.VerificationError) as error:
+            said = shorten(str(error), 120)
+            raise InputError(
+                f"{cache_directory()}: the equations cannot be compiled ({said}); a C compiler and room for the files are needed"
+            ) from error
+
+    return compile_reported
+
+
+dolfinx.jit.ffcx_jit = reported(dolfinx.jit.ffcx_jit)
+ffcx.codegeneration.jit.compile_forms = one_at_a_time(ffcx.codegeneration.jit.compile_forms)

@@ -1,10 +1,27 @@
-"""Reading text in whatever way an editor saved it; writing files so that nobody, killed run or reader, meets half a file."""
+"""Reading text in whatever way an editor saved it; files that nobody, killed run or reader, meets by half; one process at a time."""
+
+from __future__ import annotations
 
 import codecs
+import fcntl
 import hashlib
+import io
+import json
+import logging
 import os
 import re
+import time
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.errors import InputError
 
 LONGEST_NAME = 200
 """Bytes of a part of a file's name; file systems take 255 in all."""
@@ -14,6 +31,14 @@ _OTHER_MARKS = {
     codecs.BOM_UTF16_LE: "UTF-16",
     codecs.BOM_UTF16_BE: "UTF-16",
 }
+log = logging.getLogger("mpm")
+UNREADABLE = (
+    ValueError,
+    KeyError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+)  # what numpy says of a damaged archive
 
 
 def is_file(path: Path) -> bool:
@@ -43,21 +68,36 @@ def read_text(path: str | os.PathLike[str]) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+@contextmanager
+def replacing(path: str | os.PathLike[str], ending: str = ".tmp") -> Iterator[Path]:
+    """A temporary name beside `path`, whose file takes the place of `path` in one step when the block is left.
+
+    After an error it is removed and the old file stays; an OSError then names `path`.
+    """
+    path = Path(path)
+    temporary = path.with_name(path.name + ending)
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    except BaseException as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(path), None
+        raise
+
+
 def write_atomically(path: str | os.PathLike[str], content: bytes | str, *, sync: bool = False) -> None:
     """Replace `path` by `content` (text is UTF-8) in one step.
 
-    The content goes to `<name>.tmp` in the same directory, which then takes the name by `os.replace`: other
-    processes see the old file or the new one, whatever happens to this process. `sync` also flushes to the disk
-    before the name changes, so that the file survives a power failure; that costs some milliseconds.
+    Other processes see the old file or the new one, whatever happens to this process. `sync` also flushes to the disk before the name
+    changes, so that the file survives a power failure; that costs some milliseconds.
     """
-    path = Path(path)
-    temporary = path.with_name(path.name + ".tmp")
-    with open(temporary, "wb") as stream:
+    with replacing(path) as temporary, open(temporary, "wb") as stream:
         stream.write(content.encode() if isinstance(content, str) else content)
         if sync:
             stream.flush()
             os.fsync(stream.fileno())
-    os.replace(temporary, path)
 
 
 def file_name(text: str) -> str:
@@ -66,3 +106,82 @@ def file_name(text: str) -> str:
     if len(name.encode()) <= LONGEST_NAME:
         return name
     return f"{name[: LONGEST_NAME // 4]}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+
+
+def flush(path: Path) -> None:
+    """Wait until what has been written to `path` is on the disk."""
+    with open(path, "rb") as stream:
+        os.fsync(stream.fileno())
+
+
+def write_picture(path: str | os.PathLike[str], figure: Any, **options: Any) -> None:
+    """Replace `path` by a matplotlib figure, as PNG, in one step."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", **options)
+    write_atomically(path, content.getvalue())
+
+
+def write_in_place(path: Path, content: bytes, start: int) -> None:
+    """Write `content` at byte `start`, where the file ends with it: at once, or not at all when the disk has no room left for it."""
+    handle = os.open(path, os.O_WRONLY | os.O_CLOEXEC)
+    size = os.fstat(handle).st_size
+    kept = b""
+    try:
+        if start < size:
+            with open(path, "rb") as stream:
+                stream.seek(start)
+                kept = stream.read()
+        done = 0
+        while done < len(content):
+            done += os.pwrite(handle, content[done:], start + done)
+    except OSError as error:
+        with suppress(OSError):
+            os.pwrite(handle, kept, start)
+            os.ftruncate(handle, size)
+        error.filename = str(path)
+        raise
+    finally:
+        os.close(handle)
+
+
+def load_arrays(path: Path, what: str) -> dict[str, NDArray[Any]]:
+    """The arrays of an .npz file. Raises InputError when it is not `what`: empty, cut, or something else."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except UNREADABLE as error:
+        raise InputError(f"{path}: not {what} ({error or 'it is empty'})") from error
+
+
+def load_json(path: Path) -> dict[str, Any]:
+    """The object in a JSON file. Raises InputError when it is damaged."""
+    try:
+        found = json.loads(read_text(path))
+    except ValueError as error:
+        raise InputError(f"{path}: not readable as JSON ({error})") from error
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: found a {type(found).__name__}; accepted: a JSON object")
+    return found
+
+
+def lock(path: Path, patience: float = 0.0) -> IO[bytes]:
+    """Open `path` for appending and keep others out until it is closed; BlockingIOError when another process has it for `patience` seconds.
+
+    The lock goes with the process, however that ends, and holds for all machines that share the file system.
+    """
+    deadline = time.monotonic() + patience
+    while True:
+        stream = open(path, "ab")  # noqa: SIM115 (held by the caller)
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.exists(path) and os.path.samestat(os.fstat(stream.fileno()), os.stat(path)):
+                return stream  # and not a file that its last owner has removed meanwhile
+            stream.close()
+        except BlockingIOError:
+            stream.close()
+            if time.monotonic() >= deadline:
+                raise
+            time.sleep(0.05)
+        except OSError:
+            log.warning("%s: no locks on this file system; take care that one process works here", path)
+            return stream

@@ -6,7 +6,9 @@ facet it covers, wholly or in part (the share itself is `Grid.overlap`). Meshing
 
 from __future__ import annotations
 
+import errno
 import itertools
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,12 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.errors import InputError
+from mpm.files import replacing
 from mpm.geometry import Grid
 from mpm.layout import WALLS
 
 if TYPE_CHECKING:
     from mpm.case import Case
 
+END = b"$EndElements\n"  # of a .msh file without periodic parts or data
 LINE, QUADRILATERAL = 1, 3  # gmsh's element types
 Blocks = list[tuple[str, NDArray[np.int64]]]
 Lines = dict[str, NDArray[np.int64]]
@@ -52,10 +56,7 @@ def build_mesh(case: Case, path: Path | None = None) -> QuadMesh:
         _draw(gmsh, case, grid)
         gmsh.model.mesh.generate(2)
         if path is not None:
-            try:
-                gmsh.write(str(path))
-            except Exception as error:  # gmsh raises bare Exception
-                raise InputError(f"{path}: cannot write the mesh: {error}") from error
+            _write(gmsh, path)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
         points = np.zeros((int(tags.max()) + 1, 2))
         points[tags.astype(np.int64)] = coordinates.reshape(-1, 3)[:, :2]
@@ -71,6 +72,21 @@ def build_mesh(case: Case, path: Path | None = None) -> QuadMesh:
             else:
                 lines[name] = nodes
     return _in_grid_order(grid, points, blocks, lines)
+
+
+def _write(gmsh: Any, path: Path) -> None:
+    """Write gmsh's mesh to `path`. gmsh does not notice when the disk is full; then the end of the file is missing."""
+    with replacing(path, ".tmp.msh") as aside:
+        try:
+            gmsh.write(str(aside))
+        except Exception as error:  # gmsh raises bare Exception
+            raise InputError(
+                f"{path}: cannot write the mesh: {str(error).replace(aside.name, path.name)}"
+            ) from error
+        with open(aside, "rb") as stream:
+            stream.seek(max(aside.stat().st_size - len(END), 0))
+            if stream.read() != END:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def write_msh(case: Case, path: Path) -> QuadMesh:

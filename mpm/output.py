@@ -10,8 +10,9 @@
 | `checkpoint.npz` | restart state |
 | `run.log`, `plots/*.png` | log; pictures |
 
-Plain Python and numpy; the arrays that come in are global and in the grid's order. Every file is replaced as a whole
-(`mpm.files.write_atomically`), so a run killed at any moment leaves a directory that can be read and resumed.
+Plain Python and numpy; the arrays that come in are global and in the grid's order. Files are replaced as a whole
+(`mpm.files.write_atomically`) and tables grow in place (`mpm.history`, `mpm.vtu`), so a run killed at any moment leaves a directory that
+can be read and resumed. The log carries the lock that keeps a second run out.
 """
 
 from __future__ import annotations
@@ -19,21 +20,25 @@ from __future__ import annotations
 import csv
 import io
 import json
+import logging
 import math
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpm import vtu
-from mpm.errors import InputError, MpmError
-from mpm.files import write_atomically
+from mpm.errors import FULL, ConvergenceError, InputError, MpmError
+from mpm.files import flush, load_arrays, load_json, lock, write_atomically
+from mpm.history import History
 
 if TYPE_CHECKING:
     from mpm.geometry import Grid
 
+log = logging.getLogger("mpm")
 OWN_FILES = (
     "case.toml",
     "fields.pvd",
@@ -41,10 +46,10 @@ OWN_FILES = (
     "summary.json",
     "flux.csv",
     "checkpoint.npz",
-    "run.log",
 )
 OWN_PATTERNS = ("fields/fields_*.vtu", "plots/*.png", "*.tmp", "fields/*.tmp", "plots/*.tmp")
 META = "__meta__"
+PATIENCE = 3.0  # seconds to wait for a directory whose last run is just being killed
 
 
 class RunDirectory:
@@ -54,7 +59,8 @@ class RunDirectory:
         self.path = Path(path)
         self.precision = precision
         self._steps: list[tuple[float, str]] | None = None
-        self._history: list[dict[str, float]] | None = None
+        self._history: History | None = None
+        self._lock: IO[bytes] | None = None
 
     @property
     def log(self) -> Path:
@@ -69,22 +75,36 @@ class RunDirectory:
         return self.path / "plots"
 
     def prepare(self, resume: bool = False, overwrite: bool = False) -> None:
-        """Create the directory; refuse one that holds files, unless they are to be resumed or overwritten.
+        """Create the directory and keep other runs out of it until `release`; refuse one that holds files, unless they are to be resumed
+        or overwritten.
 
         `overwrite` removes the files of an earlier run (those in this module's table) and nothing else.
-        Raises InputError.
+        Raises InputError, also when the directory cannot be written or another run is at work in it.
         """
         try:
-            if self.path.is_dir() and any(self.path.iterdir()):
-                if overwrite:
-                    self._remove_own_files()
-                elif not resume:
-                    raise InputError(
-                        f"{self.path}: not empty; use --resume, --overwrite or another directory (-o)"
-                    )
+            if self.path.is_dir() and any(self.path.iterdir()) and not (resume or overwrite):
+                raise InputError(
+                    f"{self.path}: not empty; use --resume, --overwrite or another directory (-o)"
+                )
             self.path.mkdir(parents=True, exist_ok=True)
+            self._lock = lock(self.log, PATIENCE)
+            if overwrite:
+                self._remove_own_files()
+        except BlockingIOError:
+            raise InputError(f"{self.path}: another run is at work in this directory") from None
         except OSError as error:
+            self.release()
+            if error.errno in FULL:
+                raise
             raise InputError(f"{self.path}: cannot be used as output directory ({error.strerror})") from error
+
+    def release(self) -> None:
+        """Let other runs into the directory; a log in which nothing has been written goes."""
+        if self._lock is not None:
+            if os.fstat(self._lock.fileno()).st_size == 0:
+                self.log.unlink(missing_ok=True)
+            self._lock.close()
+            self._lock = None
 
     def _remove_own_files(self) -> None:
         for name in OWN_FILES:
@@ -92,6 +112,7 @@ class RunDirectory:
         for pattern in OWN_PATTERNS:
             for path in self.path.glob(pattern):
                 path.unlink()
+        os.truncate(self.log, 0)  # not removed: it carries the lock
         self._steps = self._history = None
 
     def write_case(self, text: str) -> None:
@@ -126,6 +147,8 @@ class RunDirectory:
             "layer": np.repeat(grid.row_layer, grid.columns),
             **cell_data,
         }
+        for key, values in cell_data.items():
+            _check_finite(values, f"{name}: {key}")
         points = vtu.grid_points(grid.x, grid.y, displacement)
         content = vtu.encode_vtu(
             points, vtu.grid_quads(grid.columns, grid.rows), data, float(time), self.precision
@@ -133,59 +156,34 @@ class RunDirectory:
         (self.path / "fields").mkdir(exist_ok=True)
         write_atomically(self.path / name, content)
         self.steps.append((float(time), name))
-        write_atomically(self.pvd, vtu.encode_pvd(self.steps))
+        vtu.add_to_pvd(self.pvd, self.steps)
 
     def read_fields(self, index: int = -1) -> vtu.Snapshot:
         """One of the time steps listed in `fields.pvd`, the last one by default."""
         if not self.steps:
-            raise MpmError(f"{self.pvd}: no fields have been written")
+            raise InputError(f"{self.pvd}: no fields have been written")
         return vtu.read_vtu(self.path / self.steps[index][1])
 
     # ------------------------------------------------------------------ history and summary
 
-    def append_history(self, row: Mapping[str, float | None]) -> None:
-        """Add a row to `history.csv`; `time` [s] comes first, then columns in the order they were first seen.
-
-        A number that could not be computed is None or missing and leaves its cell empty; one that is not finite is an
-        error (MpmError).
-        """
-        kept = {key: float(value) for key, value in row.items() if value is not None}
-        wrong = [key for key, value in kept.items() if not math.isfinite(value)]
-        if "time" not in kept or wrong:
-            raise MpmError(
-                "history.csv: " + (f"{wrong[0]} is {kept[wrong[0]]}" if wrong else "a row without time")
-            )
-        self._rows().append(kept)
-        self._write_history()
-
-    def _rows(self) -> list[dict[str, float]]:
+    @property
+    def table(self) -> History:
+        """`history.csv`."""
         if self._history is None:
-            path = self.path / "history.csv"
-            self._history = []
-            if path.exists():
-                with open(path, newline="", encoding="utf-8") as stream:
-                    for row in csv.DictReader(stream):
-                        self._history.append({key: float(value) for key, value in row.items() if value})
+            self._history = History(self.path / "history.csv")
         return self._history
 
-    def _write_history(self) -> None:
-        rows = self._rows()
-        columns = list(dict.fromkeys(["time", *(key for row in rows for key in row)]))
-        text = io.StringIO()
-        writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({key: repr(value) for key, value in row.items()} for row in rows)
-        write_atomically(self.path / "history.csv", text.getvalue())
+    def append_history(self, row: Mapping[str, float | None]) -> None:
+        """Add a row to `history.csv`, see `History.append`."""
+        self.table.append(row)
 
     def history(self) -> dict[str, NDArray[np.float64]]:
         """Columns of `history.csv`; NaN where a cell is empty."""
-        rows = self._rows()
-        columns = dict.fromkeys(key for row in rows for key in row)
-        return {key: np.array([row.get(key, math.nan) for row in rows]) for key in columns}
+        return self.table.by_column()
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
-        """Write `summary.json`: None is dropped; a number that is not finite is an error (MpmError)."""
-        text = json.dumps(plain(summary, "summary.json"), indent=2, allow_nan=False)
+        """Write `summary.json`; what could not be computed (None, not finite) is dropped."""
+        text = json.dumps(plain(summary, "summary.json", drop=True), indent=2, allow_nan=False)
         write_atomically(self.path / "summary.json", text + "\n", sync=True)
 
     def write_flux(self, profiles: Mapping[str, NDArray[np.float64]]) -> None:
@@ -199,12 +197,21 @@ class RunDirectory:
     def read_summary(self) -> dict[str, Any] | None:
         """Contents of `summary.json`, None when there is none."""
         path = self.path / "summary.json"
-        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+        return load_json(path) if path.exists() else None
 
     # ------------------------------------------------------------------ restart
 
     def write_checkpoint(self, arrays: Mapping[str, ArrayLike], meta: Mapping[str, Any]) -> None:
-        """Replace `checkpoint.npz`: named arrays in full precision, and `meta`, which must be JSON (numbers exact)."""
+        """Replace `checkpoint.npz`: named arrays in full precision, and `meta`, which must be JSON (numbers exact).
+
+        The tables are flushed to the disk first: a state must never count rows that a power failure takes away. Raises ConvergenceError
+        when an array is not finite; the old state stays.
+        """
+        for name, values in arrays.items():
+            _check_finite(values, f"checkpoint.npz: {name}")
+        for path in (self.table.path, self.pvd):
+            if path.exists():
+                flush(path)
         buffer = io.BytesIO()
         text = json.dumps(plain(meta, "checkpoint.npz"), allow_nan=False)
         stored: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items()}
@@ -217,21 +224,26 @@ class RunDirectory:
         path = self.path / "checkpoint.npz"
         if not path.exists():
             return None
+        arrays = load_arrays(path, "a checkpoint of mpm")
         try:
-            with np.load(path, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
-            return arrays, json.loads(arrays.pop(META).tobytes())
-        except (OSError, ValueError, KeyError) as error:
-            raise InputError(f"{path}: not a checkpoint of mpm ({error})") from error
+            meta = json.loads(arrays.pop(META).tobytes())
+        except (KeyError, ValueError) as error:
+            raise InputError(f"{path}: not a checkpoint of mpm (no {META})") from error
+        return arrays, meta
 
-    def cut_back(self, rows: int) -> None:
-        """Drop all but the first `rows` output times, those of the restart state; later output continues the numbering.
+    def cut_back(self, rows: int, time: float) -> None:
+        """Drop all but the first `rows` output times, those of the restart state at `time` [s]; later output continues the numbering.
 
-        Files that `fields.pvd` does not list any more, and unfinished ones, are deleted.
+        Files that `fields.pvd` does not list any more, unfinished ones, and the summary of an earlier end are deleted. Raises InputError
+        when a table is damaged or lacks some of those rows, before anything is changed.
         """
-        self._steps = self.steps[:rows]
+        steps, table = self.steps[:rows], self.table
+        table.cut_back(rows, time)
+        self._steps = steps
         if self.pvd.exists():
             write_atomically(self.pvd, vtu.encode_pvd(self._steps))
+        for name in ("summary.json", "flux.csv"):
+            (self.path / name).unlink(missing_ok=True)
         listed = {self.path / name for _, name in self._steps}
         for path in [
             *self.path.glob("fields/fields_*.vtu"),
@@ -240,23 +252,37 @@ class RunDirectory:
         ]:
             if path not in listed:
                 path.unlink()
-        self._history = self._rows()[:rows]
-        if (self.path / "history.csv").exists():
-            self._write_history()
 
 
-def plain(value: Any, where: str) -> Any:
-    """`value` in JSON's own types: numpy numbers and arrays converted, None dropped; MpmError when not finite."""
+def _check_finite(values: ArrayLike, name: str) -> None:
+    """Raise ConvergenceError when a number is not one."""
+    array = np.asarray(values)
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise ConvergenceError(f"{name} is not finite; nothing of it has been written")
+
+
+def plain(value: Any, where: str, drop: bool = False) -> Any:
+    """`value` in JSON's own types: numpy numbers and arrays converted, None dropped.
+
+    What is not finite is dropped too (a list with it), or without `drop` an MpmError.
+    """
     if isinstance(value, Mapping):
-        return {str(key): plain(item, f"{where}: {key}") for key, item in value.items() if item is not None}
+        items = {str(key): plain(item, f"{where}: {key}", drop) for key, item in value.items()}
+        return {key: item for key, item in items.items() if item is not None}
     if isinstance(value, np.ndarray):
-        return plain(value.tolist(), where)
+        return plain(value.tolist(), where, drop)
     if isinstance(value, list | tuple):
-        return [plain(item, f"{where}[{index}]") for index, item in enumerate(value)]
+        found = [plain(item, f"{where}[{index}]", drop) for index, item in enumerate(value)]
+        return None if None in found else found
     if isinstance(value, np.generic):
         value = value.item()
+    if value is None:
+        return None
     if isinstance(value, float) and not math.isfinite(value):
-        raise MpmError(f"{where} is {value}")
+        if not drop:
+            raise MpmError(f"{where} is {value}")
+        log.warning("%s is %g, left out", where, value)
+        return None
     if not isinstance(value, bool | int | float | str):
         raise MpmError(f"{where}: {type(value).__name__} is not a number, text, list or table")
     return value

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from mpm.diagnostics import exit_column
 from mpm.errors import InputError
-from mpm.files import file_name
+from mpm.files import file_name, write_picture
 from mpm.labels import literal
 from mpm.maps import MM, OKABE_ITO, coverage_figure, cvd_figure, formula, species_figure
 from mpm.results import Run, dosing_inlets, fed_species, load_run, made_sites, sites_made_by
@@ -73,7 +73,7 @@ def plot_run(directory: str | Path, say: Callable[[str], None] = log.warning) ->
     with style.context(STYLE):
         for name, figure in figures(run, note):
             paths.append(run.directory.plots / f"{name}.png")
-            figure.savefig(paths[-1])
+            write_picture(paths[-1], figure)
     if troubles and not paths:
         raise InputError(f"{run.directory.path}: no picture can be drawn of what is there")
     return paths

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import time as clock
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
@@ -23,10 +23,21 @@ if TYPE_CHECKING:
     from mpm.reactor import Reactor
 
 
+class LogFile(logging.FileHandler):
+    """A log that says nothing when the disk is full: the next table does."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Not even a traceback."""
+
+    def close(self) -> None:
+        with suppress(OSError):
+            super().close()
+
+
 @contextmanager
 def log_file(log: logging.Logger, path: Path | None) -> Iterator[None]:
     """Add the messages of `log` to the file `path`; without one they go nowhere."""
-    handler = logging.FileHandler(path, encoding="utf-8") if path is not None else logging.NullHandler()
+    handler = LogFile(path, encoding="utf-8") if path is not None else logging.NullHandler()
     handler.setFormatter(logging.Formatter("%(asctime)s %(message)s"))
     log.setLevel(logging.INFO)
     log.addHandler(handler)

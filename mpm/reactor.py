@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm import checkpoint, fem  # noqa: F401  (fem first: it loads the finite-element stack)
+from mpm import checkpoint, fem  # fem first: it loads the finite-element stack
 from mpm.balances import LIMIT, require_balance, worst_balance
 from mpm.bed import Bed
 from mpm.check import check_case
 from mpm.diagnostics import State, Totals, total_concentration
 from mpm.dispersion import vibrational_dispersion
-from mpm.errors import ConvergenceError, InputError, Interrupted
+from mpm.errors import ConvergenceError, InputError, Interrupted, StorageError, storage_error
 from mpm.flownumbers import flux_profiles
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
@@ -66,6 +66,7 @@ class Reactor:
 
     def __init__(self, case: Case, comm: MPI.Comm = MPI.COMM_WORLD):
         self.case, self.comm = case, comm
+        on_root(comm, fem.check_cache)
         self.identity = checkpoint.identity(case)  # now: the profile's file may change while the run goes on
         self.grid = Grid.from_case(case)
         self.schedule = Schedule.from_case(case)
@@ -81,6 +82,7 @@ class Reactor:
         self.sites_initially = total(comm, self.bed.content())
         self.stored_initially = total(comm, self.transport.concentration @ self.transport.gas_volume)
         self.before: Totals | None = None
+        self.kept: float | None = None  # time of the restart state on disk [s]
         self._stop = False
 
     # --- running ---
@@ -96,10 +98,22 @@ class Reactor:
         """March to the end of the case, calling `callback(reactor)` at every output time.
 
         With `output`, everything the run writes goes there; `resume` continues from its restart state. Raises InputError (directory,
-        changed case), ConvergenceError and Interrupted; after the last two the directory is usable and can be resumed.
+        changed case), ConvergenceError, StorageError (full disk) and Interrupted; after the last three the directory is usable and can be
+        resumed.
         """
         self.begun = clock.monotonic()
-        directory = self._open(output, resume, overwrite)
+        directory = RunDirectory(output) if output is not None else None
+        try:
+            if directory is not None:
+                self._open(directory, resume, overwrite)
+            return self._run(directory, callback, progress)
+        except OSError as error:
+            raise self._explain(error) from error
+        finally:
+            if directory is not None:
+                directory.release()
+
+    def _run(self, directory: RunDirectory | None, callback: Callback | None, progress: bool) -> Result:
         file = directory.log if directory is not None and is_root(self.comm) else None
         with log_file(log, file), Progress(self, progress) as bar, stop_signals(self._request_stop):
             log.info(
@@ -115,14 +129,14 @@ class Reactor:
             if self.case.fidelity == "steady":
                 return self._run_steady(directory, callback, bar)
             try:
-                if self._restored:
+                if self.kept is not None:
                     log.info("resumed at t = %g s, after step %d", self.time, self.steps)
                 else:
                     self._start(bar)
                     log.info("flow found after %.1f s", self.wall)
                     self._write(directory, callback, None)
                     if directory is not None:
-                        checkpoint.write(self, directory)  # the flow may have taken minutes
+                        self._keep(directory)  # the flow may have taken minutes
                 self._march(directory, callback, bar)
                 require_balance(self.case, self.totals())
             except (ConvergenceError, Interrupted) as error:
@@ -137,12 +151,17 @@ class Reactor:
         """Wall time so far [s], of the parts before a restart too."""
         return self.wall_before + clock.monotonic() - self.begun
 
-    def _open(self, output: str | Path | None, resume: bool, overwrite: bool) -> RunDirectory | None:
+    def _explain(self, error: OSError) -> Exception:
+        """What a full or closed disk means for the run; the error itself when it is about something else."""
+        said = storage_error(error)
+        if isinstance(said, StorageError) and self.kept is not None:
+            said = StorageError(
+                f"{said}; the restart state at t = {self.kept:.6g} s is whole: make room and go on with --resume"
+            )
+        return said or error
+
+    def _open(self, directory: RunDirectory, resume: bool, overwrite: bool) -> None:
         """Prepare the directory on rank 0 and read a restart state into every rank."""
-        self._restored = False
-        if output is None:
-            return None
-        directory = RunDirectory(output)
 
         def prepare() -> Any:
             directory.prepare(resume=resume, overwrite=overwrite)
@@ -155,18 +174,16 @@ class Reactor:
         state = on_root(self.comm, prepare)
         if state is not None:
             checkpoint.restore(self, *state)
-            self._restored = True
-            rows = state[1]["rows"]
+            self.kept, rows = self.time, state[1]["rows"]
 
             def cut_back() -> dict[str, Floats]:
-                directory.cut_back(rows)
+                directory.cut_back(rows, self.time)
                 return directory.history()
 
             self.rows = checkpoint.rows(on_root(self.comm, cut_back))
             self.numbers = self.rows[-1] if self.rows else {}
         elif resume:
-            on_root(self.comm, lambda: directory.cut_back(0))
-        return directory if is_root(self.comm) else RunDirectory(output)
+            on_root(self.comm, lambda: directory.cut_back(0, 0.0))
 
     def _start(self, bar: Progress) -> None:
         """Find the flow of a fresh run, unless it was handed over."""
@@ -313,6 +330,7 @@ class Reactor:
         """Write the restart state. Raises BalanceError when it is out of balance: then the last good one stays."""
         require_balance(self.case, self.totals())
         checkpoint.write(self, directory)
+        self.kept = self.time
 
     def _give_up(self, directory: RunDirectory | None, error: Exception) -> None:
         """Keep the last good state and say in summary.json how the run ended."""

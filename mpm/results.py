@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,8 +46,6 @@ class Run:
             found = self.directory.read_fields(index)
         except OSError as error:
             raise InputError(f"{file}: {error.strerror}") from None
-        except (MpmError, ValueError, KeyError, struct.error, zlib.error) as error:
-            raise InputError(f"{file}: damaged ({error})") from None
         if len(found.quads) != self.grid.cells:
             raise InputError(
                 f"{file}: found {len(found.quads)} cells; accepted: the {self.grid.cells} of case.toml"

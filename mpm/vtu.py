@@ -19,10 +19,13 @@ from xml.sax.saxutils import unescape
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mpm.errors import MpmError
+from mpm.errors import InputError, MpmError
+from mpm.files import write_atomically, write_in_place
 from mpm.labels import xml_attribute
 
 VTK_QUAD = 9
+CLOSING = "</Collection>\n</VTKFile>\n"
+PAGE = 4096  # bytes that a system writes at once, or more
 VTK_TYPE = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "uint8": "UInt8"}
 
 
@@ -124,35 +127,55 @@ def read_vtu(path: str | Path) -> Snapshot:
     """Read a file written by `encode_vtu` (this reader knows no other variant of the format)."""
     content = Path(path).read_bytes()
     head, _, appended = content.partition(b'<AppendedData encoding="raw">\n_')
-    if not appended:
-        raise MpmError(f"{path}: not a .vtu file written by mpm")
+    if not appended.endswith(b"</VTKFile>\n"):
+        raise InputError(f"{path}: not a whole .vtu file written by mpm")
     arrays: dict[str, NDArray[np.generic]] = {}
     pattern = r'<DataArray type="(\w+)" Name="([^"]+)"(?: NumberOfComponents="(\d)")? format="appended" offset="(\d+)"/>'
-    for kind, name, components, offset in re.findall(pattern, head.decode()):
-        start = int(offset)
-        (_, _, _, size) = struct.unpack_from("<4Q", appended, start)
-        values = np.frombuffer(zlib.decompress(appended[start + 32 : start + 32 + size]), dtype=kind.lower())
-        arrays[unescape(name, {"&quot;": '"'})] = (
-            values.reshape(-1, int(components)) if components else values
-        )
-    found = re.search(rb'Name="TimeValue"[^>]*>([^<]+)<', head)
-    points, quads = arrays.pop("Points"), arrays.pop("connectivity").reshape(-1, 4)
-    del arrays["offsets"], arrays["types"]
-    return Snapshot(
-        points.astype(np.float64), quads.astype(np.int32), arrays, float(found[1]) if found else float("nan")
-    )
+    try:
+        for kind, name, components, offset in re.findall(pattern, head.decode()):
+            start = int(offset)
+            (_, _, _, size) = struct.unpack_from("<4Q", appended, start)
+            values = np.frombuffer(
+                zlib.decompress(appended[start + 32 : start + 32 + size]), dtype=kind.lower()
+            )
+            arrays[unescape(name, {"&quot;": '"'})] = (
+                values.reshape(-1, int(components)) if components else values
+            )
+        found = re.search(rb'Name="TimeValue"[^>]*>([^<]+)<', head)
+        points, quads = arrays.pop("Points"), arrays.pop("connectivity").reshape(-1, 4)
+        del arrays["offsets"], arrays["types"]
+        time = float(found[1]) if found else float("nan")
+    except (zlib.error, struct.error, KeyError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: not a whole .vtu file written by mpm ({error})") from error
+    return Snapshot(points.astype(np.float64), quads.astype(np.int32), arrays, time)
 
 
 def encode_pvd(steps: Sequence[tuple[float, str]]) -> str:
     """The text of a `.pvd`: time [s] and path, relative to the `.pvd`, of every step."""
-    lines = "".join(
-        f'<DataSet timestep="{time!r}" group="" part="0" file={xml_attribute(name)}/>\n'
-        for time, name in steps
-    )
     return (
-        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
-        f"<Collection>\n{lines}</Collection>\n</VTKFile>\n"
+        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n<Collection>\n'
+        + "".join(dataset(time, name) for time, name in steps)
+        + CLOSING
     )
+
+
+def dataset(time: float, name: str) -> str:
+    """The line of one step in a `.pvd`."""
+    return f'<DataSet timestep="{time!r}" group="" part="0" file={xml_attribute(name)}/>\n'
+
+
+def add_to_pvd(path: Path, steps: Sequence[tuple[float, str]]) -> None:
+    """List the last of `steps` in the `.pvd` that lists those before it, at a cost that does not grow with their number.
+
+    The entry goes over the closing tags, which follow it. A kill can come between two pages of a write, so where that would cross the
+    border of one the file is replaced as a whole: it is valid XML at any moment.
+    """
+    tail = (dataset(*steps[-1]) + CLOSING).encode()
+    start = path.stat().st_size - len(CLOSING) if path.exists() and len(steps) > 1 else 0
+    if start <= 0 or start // PAGE != (start + len(tail) - 1) // PAGE:
+        write_atomically(path, encode_pvd(steps))
+    else:
+        write_in_place(path, tail, start)
 
 
 def read_pvd(path: str | Path) -> list[tuple[float, Path]]:
@@ -164,4 +187,4 @@ def read_pvd(path: str | Path) -> list[tuple[float, Path]]:
         entries = ElementTree.parse(path).getroot().iter("DataSet")
         return [(float(entry.attrib["timestep"]), path.parent / entry.attrib["file"]) for entry in entries]
     except (ElementTree.ParseError, KeyError, ValueError) as error:
-        raise MpmError(f"{path}: not a readable .pvd file ({error})") from error
+        raise InputError(f"{path}: not a readable .pvd file ({error})") from error

@@ -98,6 +98,7 @@ def test_restart_state_is_complete_on_several_ranks(mode: str, tmp_path: Path) -
     def prepare() -> None:
         directory.prepare(resume=False, overwrite=False)
         directory.write_case(case.to_toml())
+        directory.release()
 
     on_root(COMM, prepare)
     reactor, written = Reactor(case, COMM), []

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mpm.errors import printable
-from mpm.files import write_atomically
+from mpm.files import write_atomically, write_picture
 from mpm.labels import literal
 
 from .analysis import Results
@@ -114,7 +114,7 @@ def draw(
     paths = []
     for name, figure in figures.items():
         path = plots / f"{name}.png"
-        figure.savefig(path, dpi=150)
+        write_picture(path, figure, dpi=150)
         paths.append(path)
     return paths
 
@@ -276,4 +276,4 @@ def draw_waveform(
         moved.set(xlabel="t [ms]", ylabel=f"displacement {name} [µm]")
     for axis in axes[0, :2]:
         axis.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    write_picture(path, figure, dpi=150)

@@ -9,15 +9,16 @@ import signal
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
-from mpm.errors import ConvergenceError, InputError, Interrupted
-from mpm.files import write_atomically
+from mpm.errors import ConvergenceError, InputError, Interrupted, storage_error
+from mpm.files import lock, write_atomically
 
 from .analysis import Arrays, analyse
 from .box import Particles, load_lammps
@@ -25,6 +26,7 @@ from .case import DemCase, load_case
 from .report import draw, write_summary, write_tables
 from .simulate import Simulation
 
+LOCK = "lock"  # the file in a directory that says that a run is at work
 Report = Callable[[int, float], None]  # (seed, cycles done)
 
 
@@ -32,20 +34,29 @@ def silent(seed: int, cycles: float) -> None:
     """No progress report."""
 
 
-def prepare(case: DemCase, directory: Path, resume: bool, overwrite: bool) -> None:
-    """Make the directory and write case.toml; refuse one with something in it unless told what to do."""
+def prepare(case: DemCase, directory: Path, resume: bool, overwrite: bool) -> IO[bytes]:
+    """Make the directory and write case.toml; refuse one with something in it unless told what to do, or that another run works in.
+
+    Others are kept out until the file that is returned, `lock` in the directory, is closed.
+    """
     if directory.exists() and not directory.is_dir():
         raise InputError(f"{directory}: is a file, not a directory")
-    if directory.exists() and any(directory.iterdir()) and not resume:
-        if not overwrite:
-            raise InputError(
-                f"{directory}: is not empty; use --resume to go on or --overwrite to replace the run"
-            )
+    used = directory.exists() and any(path.name != LOCK for path in directory.iterdir())
+    if used and not resume and not overwrite:
+        raise InputError(
+            f"{directory}: is not empty; use --resume to go on or --overwrite to replace the run"
+        )
+    directory.mkdir(parents=True, exist_ok=True)
+    try:
+        held = lock(directory / LOCK)
+    except BlockingIOError:
+        raise InputError(f"{directory}: another mpm dem is at work in this directory") from None
+    if used and not resume:
         for old in directory.glob("seed_*"):
             shutil.rmtree(old)
         (directory / "summary.json").unlink(missing_ok=True)
-    directory.mkdir(parents=True, exist_ok=True)
     write_atomically(directory / "case.toml", case.to_toml())
+    return held
 
 
 def seed_directory(directory: Path, seed: int) -> Path:
@@ -69,29 +80,25 @@ def run_case(
     began = time.monotonic()
     from mpi4py import MPI
 
+    from mpm.parallel import on_root
+
     world = MPI.COMM_WORLD
-    if world.rank == 0:
-        failure = None
-        try:
-            prepare(case, directory, resume, overwrite)
-        except InputError as error:
-            failure = error
-    else:
-        failure = None
-    failure = world.bcast(failure, root=0)
-    if failure is not None:
-        raise failure
-    if world.size > 1:
-        _over_ranks(case, directory, resume, report, world)
-    elif jobs > 1 and len(case.run.seeds) > 1:
-        _side_by_side(case, directory, jobs, resume, report)
-    else:
-        for seed in case.run.seeds:
-            Simulation(case, seed, seed_directory(directory, seed)).run(resume, partial(report, seed))
-    summary: dict[str, Any] = {}
-    if world.rank == 0:
-        summary = finish(case, directory, time.monotonic() - began, world.size if world.size > 1 else jobs)
-    return world.bcast(summary, root=0) if world.size > 1 else summary
+    with ExitStack() as stack:
+
+        def begin() -> None:
+            held = stack.enter_context(prepare(case, directory, resume, overwrite))
+            stack.callback(Path(held.name).unlink, missing_ok=True)
+
+        on_root(world, begin)
+        if world.size > 1:
+            _over_ranks(case, directory, resume, report, world)
+        elif jobs > 1 and len(case.run.seeds) > 1:
+            _side_by_side(case, directory, jobs, resume, report)
+        else:
+            for seed in case.run.seeds:
+                Simulation(case, seed, seed_directory(directory, seed)).run(resume, partial(report, seed))
+        workers = world.size if world.size > 1 else jobs
+        return on_root(world, lambda: finish(case, directory, time.monotonic() - began, workers))
 
 
 def finish(case: DemCase, directory: Path, seconds: float, workers: int) -> dict[str, Any]:
@@ -168,7 +175,10 @@ def _work(toml_path: Path, seed: int, resume: bool, messages: Any) -> None:
     except (InputError, ConvergenceError) as error:
         messages.put((seed, "failed", error))
     except Exception as error:
-        messages.put((seed, "crashed", f"{type(error).__name__}: {error}"))
+        said = storage_error(error) if isinstance(error, OSError) else None
+        messages.put(
+            (seed, "failed", said) if said else (seed, "crashed", f"{type(error).__name__}: {error}")
+        )
     else:
         messages.put((seed, "done", None))
 

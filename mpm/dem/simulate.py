@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mpm.errors import ConvergenceError, InputError
-from mpm.files import write_atomically
+from mpm.files import load_arrays, write_atomically
 
 from ..constants import GRAVITY
 from .base import FLAT, Base, Filling, fit_length, frit_monolayer, loose_filling, sawtooth_baffle
@@ -207,8 +207,7 @@ class Simulation:
         """The saved state, None when there is none. Every rank reads it."""
         if not self.state_file.exists():
             return None
-        with np.load(self.state_file) as archive:
-            saved = dict(archive)
+        saved = load_arrays(self.state_file, "the state of a powder run of mpm")
         if str(saved["case"]) != self.case.content_hash():
             raise InputError(
                 f"{self.directory}: holds another powder file's run; only seeds, cycles, discard and the profile "

@@ -5,7 +5,6 @@ verdicts. Killing the driver at any moment therefore loses nothing, and the next
 """
 
 import contextlib
-import fcntl
 import os
 import queue
 import signal
@@ -19,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from mpm.errors import InputError
-from mpm.files import write_atomically
+from mpm.files import lock, write_atomically
 from mpm.sweep.board import Board, now, say
 from mpm.sweep.cluster import Pool, PoolLost, open_pool
 from mpm.sweep.layout import Layout, read_json
@@ -86,15 +85,11 @@ def run_sweep(
 @contextlib.contextmanager
 def sole_driver(layout: Layout) -> Iterator[None]:
     """Hold the directory's lock; InputError when another driver does. It goes with the process, however that ends."""
-    with open(layout.driver / "lock", "a") as stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"{layout.root}: another mpm sweep is at work in this directory") from None
-        except OSError:
-            say(
-                f"{layout.root} is on a file system without locks; take care to run one sweep at a time in it"
-            )
+    try:
+        stream = lock(layout.driver / "lock")
+    except BlockingIOError:
+        raise InputError(f"{layout.root}: another mpm sweep is at work in this directory") from None
+    with stream:
         yield
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mpm.files import file_name
+from mpm.files import file_name, write_picture
 from mpm.labels import literal
 from mpm.sweep.quantities import factor
 from mpm.sweep.results import Results
@@ -181,7 +181,7 @@ def draw(results: Results) -> list[Path]:
             parallel_coordinates(figure, free, values, label)
         figure.suptitle(literal(sweep.title), fontsize="medium")
         file = directory / f"{file_name(name)}.png"
-        figure.savefig(file, dpi=150)
+        write_picture(file, figure, dpi=150)
         files.append(file)
     return files
 

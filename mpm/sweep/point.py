@@ -7,6 +7,7 @@ rank. The compiled forms are shared by all points through the user's cache of do
 
 import contextlib
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -20,7 +21,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from mpm.errors import InputError
+from mpm.errors import FULL, InputError, StorageError
+from mpm.files import write_atomically
 from mpm.sweep import guard
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.lease import Watch
@@ -47,10 +49,11 @@ GRACE = 10.0
 """Seconds that a point gets to save its restart state when it is told to stop."""
 PATIENCE = 60.0
 """Seconds to wait for a point's lock: its last owner may be within its grace."""
-STALE_FORM = re.compile(r"JIT compilation timed out.*remove (\S+\.c)\)")
 LAUNCHER_LINE = re.compile(
     r"=|\[(proxy|mpiexec)|Abort\(|application called MPI_Abort|YOUR APPLICATION|This typically|Please see the FAQ"
 )
+NO_ROOM = 74
+"""Exit status (EX_IOERR) in the record of a point that met a full disk."""
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
 
@@ -148,6 +151,11 @@ def error_of(record: Mapping[str, Any], layout: Layout, name: str) -> str:
     return last_line(layout.log(name)) or f"exit status {record['exit_status']} without a message"
 
 
+def is_full(line: str) -> bool:
+    """Whether a point's last line tells of a full or failing disk."""
+    return any(os.strerror(number) in line for number in FULL)
+
+
 _slot = threading.local()
 """Each thread that runs points keeps a guard."""
 
@@ -213,9 +221,7 @@ def run_point(task: Task) -> dict[str, Any]:
     status = attempt(task, number, resume, watch)
     if status == 2 and resume:
         status = attempt(task, number, False, watch)
-    stale = STALE_FORM.search(last_line(layout.log(task.name)))
-    if stale and status not in (0, guard.LOCK_TAKEN):
-        # A process killed in the middle of compiling a form has left it behind; everybody would wait for it.
-        Path(stale.group(1)).unlink(missing_ok=True)
-        status = attempt(task, number, any(run.glob("checkpoint.*")), watch)
+    if status == StorageError.exit_status and is_full(last_line(layout.log(task.name))):
+        # The point is not to blame: no verdict, and the next call tries it again.
+        write_atomically(record, json.dumps(read_json(record) | {"exit_status": NO_ROOM}))
     return read_json(record) or {"exit_status": status}

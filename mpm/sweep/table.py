@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mpm.errors import InputError
-from mpm.files import write_atomically
+from mpm.files import replacing, write_atomically
 from mpm.sweep.layout import Layout, read_json
 
 if TYPE_CHECKING:
@@ -110,9 +110,8 @@ def write_parquet(
         arrays.append(pa.array(values, kind))
         fields.append(pa.field(column, kind, metadata={"unit": unit} if unit else None))
     schema = pa.schema(fields, metadata={"mpm.sweep": json.dumps(about)})
-    temporary = path.with_name(path.name + ".tmp")
-    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), temporary)
-    temporary.replace(path)
+    with replacing(path) as aside:
+        pq.write_table(pa.Table.from_arrays(arrays, schema=schema), aside)
     return True
 
 
