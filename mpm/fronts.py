@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.balances import FLOOR
 from mpm.chemistry import inlet_concentrations
 from mpm.diagnostics import (
-    FLOOR,
     State,
     Totals,
     conveyed_layer,

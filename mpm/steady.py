@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mpm.cellbalance import balance_cells
 from mpm.coarsening import coarser, prolong
+from mpm.conveying import carry
 from mpm.errors import ConvergenceError
 from mpm.parallel import any_rank, largest, total
 from mpm.replay import Replay
@@ -73,7 +74,7 @@ class SteadyProblem(SteadySystem):
         """One Newton step, or a `share` of it, at pseudo-time step `step` [s]; returns the residual after it, relative to the feed.
 
         The linear system gives the inflow of every cell and the coverage with which solids enter it. Concentrations follow from the
-        balance of each cell with these, coverages from the concentrations by `sweep`; both stay physical, however long the step.
+        balance of each cell with these, coverages from the concentrations by `carry`; both stay physical, however long the step.
         """
         gas, coverage, parts = self.residual(step)
         matrix = self.jacobian(step, parts)
@@ -92,7 +93,7 @@ class SteadyProblem(SteadySystem):
         self.theta = self.theta.copy()
         self.theta[:, self.moving] = leaving / leaving.sum(axis=0)
         balance_cells(self, predicted, step)
-        self.sweep(step)
+        carry(self, step)
         self.iterations += 1
         return self.size(*self.residual(step)[:2])
 
@@ -150,7 +151,7 @@ class SteadyProblem(SteadySystem):
             problem.solve()
             prolong(problem, self)
             self.old = self.concentration, self.theta
-            self.sweep(self.last_step)
+            carry(self, self.last_step)
         except ConvergenceError:
             pass  # a first guess is not worth an error
 

@@ -33,7 +33,7 @@ STORED = 1e-10  # of the largest feed: what the solids at rest may still take up
 
 
 class SteadySystem:
-    """Residual and Jacobian on the flow field `number` of the reactor's transport, and the coverage that follows from concentrations.
+    """Residual and Jacobian on the flow field `number` of the reactor's transport, and the way coverages enter them.
 
     `concentration` (coupled, own cells) [mol/m3]; `theta` (sites, reactive cells): leaving coverage where moving, own coverage at rest.
     At least one species that reacts is fed.
@@ -244,51 +244,6 @@ class SteadySystem:
             values += [-port.into, -port.area / area] * self.b
         return [*values, np.ones(self.held)]
 
-    def sweep(self, step: float) -> None:
-        """Carry the solids along the bed at the present concentrations: theta_out of every cell from the one before it.
-
-        In every cell theta_out = M theta_in with a stochastic M, so the coverage stays within [0, 1]. Periodic solids come in as they
-        left: the fixed point of the product of all M.
-        """
-        if not self.conveys:
-            return
-        bed, surface, k = self.bed, self.transport.surface, self.kinds
-        chosen = self.bed.cells[self.moving]
-        span = 1.0 / (1.0 / step + 1.0 / self.residence)
-        share = span / self.residence
-        part = surface.part(self.moving)
-        c = self.concentration[:, chosen]
-        columns = [
-            part.conveyed(c, np.repeat(e[:, None], len(self.moving), axis=1), span).out for e in np.eye(k)
-        ]
-        local = np.zeros((k * k + k, len(bed.cells)))
-        local[: k * k, self.moving] = np.concatenate(columns)  # column by column
-        local[k * k :, self.moving] = self.old[1][:, self.moving]
-        whole = bed.scatter.to_all(local).reshape(len(local), len(bed.rows), bed.columns)[:, bed.moving_rows]
-        m = np.moveaxis(
-            whole[: k * k].reshape(k, k, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0)
-        )  # (columns, rows, out, in)
-        aged = (1.0 - share) * np.moveaxis(whole[k * k :], (0, 1, 2), (2, 1, 0))  # (columns, rows, sites)
-        incoming = bed.fresh[:, bed.moving_rows].T
-        theta = np.empty_like(aged)
-        m, aged = (
-            m[:: self.direction],
-            aged[:: self.direction],
-        )  # in the order in which solids meet the columns
-        if self.periodic:
-            incoming = _fixed_point(m, aged, share, incoming)
-        for j in range(len(m)):
-            incoming = np.einsum("roi,ri->ro", m[j], share * incoming + aged[j])
-            incoming = np.maximum(incoming, 0.0)
-            incoming = theta[j] = incoming / incoming.sum(
-                axis=1, keepdims=True
-            )  # rounding would add up along the bed
-        result = np.zeros((k, len(bed.rows), bed.columns))
-        result[:, bed.moving_rows] = np.moveaxis(theta[:: self.direction], (0, 1, 2), (2, 1, 0))
-        new = self.theta.copy()
-        new[:, self.moving] = bed.scatter.to_local(result.reshape(k, -1))[:, self.moving]
-        self.theta = new
-
     def size(self, gas: Floats, coverage: Floats) -> float:
         """Sum of |gas residual| plus that of the coverage in sites per second, over the largest feed."""
         sites = (
@@ -303,18 +258,3 @@ class SteadySystem:
 def doses(transport: Transport) -> Floats:
     """1 for every inlet that doses in the steady state, else 0, (inlets,)."""
     return np.array([stays_open(inlet) for inlet in transport.case.geometry.inlets])
-
-
-def _fixed_point(m: Floats, aged: Floats, share: float, start: Floats) -> Floats:
-    """Coverage (rows, sites) that the solids bring back after one turn: theta = A theta + c of all columns together."""
-    k = m.shape[-1]
-    a = np.broadcast_to(np.eye(k), m.shape[1:]).copy()
-    c = np.zeros(m.shape[1:3])
-    for j in range(len(m)):
-        a = share * m[j] @ a
-        c = np.einsum("roi,ri->ro", m[j], share * c + aged[j])
-    theta = start
-    for row in range(len(a)):
-        gap = np.eye(k) - a[row]
-        theta[row] = np.linalg.lstsq(np.vstack([gap, np.ones(k)]), np.append(c[row], 1.0))[0]
-    return theta

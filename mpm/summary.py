@@ -1,19 +1,20 @@
-"""summary.json and the rows of history.csv: the numbers people quote, SI units, defined in `mpm.diagnostics` and `mpm.fronts`."""
+"""summary.json and the rows of history.csv: the numbers people quote, SI units.
+
+They are defined in `mpm.diagnostics`, `mpm.balances` and `mpm.fronts`.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from mpm.balances import element_balances, site_balance, species_balances
 from mpm.diagnostics import (
     State,
     Totals,
     cvd,
-    element_balances,
     flatten,
     nested,
     outlet_fractions,
-    site_balance,
-    species_balances,
     titration,
     utilisation,
 )

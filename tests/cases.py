@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 import mpm.fem  # noqa: F401  (loads the finite-element stack before mpi4py)
+from mpm.balances import element_balances, site_balance, species_balances
 from mpm.case import Case, load_case
-from mpm.diagnostics import element_balances, site_balance, species_balances
 from mpm.flow import boundary_flows, face_flow
 from mpm.parallel import largest
 from mpm.reactor import Reactor, Result
