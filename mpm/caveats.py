@@ -117,6 +117,17 @@ def feed_caveats(case: Case) -> list[str]:
     return found
 
 
+def steady_caveats(case: Case) -> list[str]:
+    """Inlets that dose for a time only: the steady state is that after the last window, without them."""
+    if case.fidelity != "steady":
+        return []
+    return [
+        f"inlet {inlet.name} stops dosing at {inlet.windows[-1][1]:g} s: in the steady state it blows carrier gas alone"
+        for inlet in case.geometry.inlets
+        if any(inlet.mass_fractions.values()) and math.isfinite(inlet.windows[-1][1])
+    ]
+
+
 def _apart(value: float, expected: float) -> bool:
     return not expected / SAME_PROPERTY <= value <= expected * SAME_PROPERTY
 

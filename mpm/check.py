@@ -7,7 +7,7 @@ from typing import Any
 
 from mpm import engineering as eng
 from mpm.case import Case
-from mpm.caveats import feed_caveats, gas_caveats, mass_caveats, profile_caveats
+from mpm.caveats import feed_caveats, gas_caveats, mass_caveats, profile_caveats, steady_caveats
 from mpm.chemistry import inlet_concentrations
 from mpm.dem.relations import (
     mean_free_path,
@@ -182,7 +182,13 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
 
 def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     """What is legal but questionable, one sentence each. A number that `report` lacks was not finite."""
-    found = [*profile_caveats(case), *gas_caveats(case), *mass_caveats(case), *feed_caveats(case)]
+    found = [
+        *profile_caveats(case),
+        *gas_caveats(case),
+        *mass_caveats(case),
+        *feed_caveats(case),
+        *steady_caveats(case),
+    ]
     motion, bed = report["motion"], report.get("bed", {})
     speed = abs(case.motion.mean_velocity)
     if case.motion.gamma > 0.0 and bed and speed > motion.get("perfect_flight", math.inf):

@@ -164,6 +164,7 @@ def test_expected_steps(case: Case) -> None:
             "columns in a step, which leaves stripes of single columns in the coverage: lower time.step to 26.2 ms",
         ),
         ({"fidelity": "resolved", "geometry.cell_width": "2 mm"}, "per cent to diffusion"),
+        ({"fidelity": "steady", "geometry.inlet.tma.stop": "5 s"}, "inlet tma stops dosing at 5 s"),
     ],
 )
 def test_what_is_questionable_is_said(case: Case, change: dict[str, object], text: str) -> None:
