@@ -32,6 +32,8 @@ from mpm.sweep.table import write_csv
 
 SAVE_EVERY = 2.0
 """Least seconds between two writes of results.csv while points run."""
+SAVE_SHARE = 0.05
+"""Most of the driver's time that these writes, whose cost grows with the table, may take."""
 INCOMPLETE = 3
 INTERRUPTED = 130
 
@@ -204,7 +206,7 @@ class Collector:
         """Sum of the points' own times in this call."""
         self._ended: queue.SimpleQueue[Future[dict[str, Any]]] = queue.SimpleQueue()
         self._names: dict[Future[dict[str, Any]], str] = {}
-        self._saved = 0.0
+        self._next_save = 0.0
 
     def run(self, tasks: Sequence[Task], lease: Lease) -> bool:
         """Until every task has ended; True when a signal put an earlier end to it."""
@@ -252,6 +254,15 @@ class Collector:
         took = float(record.get("seconds", 0.0))
         self.seconds += took
         board.update(name, self.results.states[name], self.results.errors[name], took)
-        if time.monotonic() - self._saved > SAVE_EVERY:
+        if time.monotonic() >= self._next_save:
+            self._save()
+
+    def _save(self) -> None:
+        """Write results.csv for those who look on. A full disk is no reason to stop points that have room: the verdicts are theirs."""
+        began = time.monotonic()
+        try:
             write_csv(self.results.layout.root / "results.csv", self.results.columns(), self.results.rows())
-            self._saved = time.monotonic()
+        except OSError as error:
+            say(f"results.csv cannot be written now ({error.strerror})")
+        took = time.monotonic() - began
+        self._next_save = time.monotonic() + max(SAVE_EVERY, took / SAVE_SHARE)

@@ -21,6 +21,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from mpm.case import load_case
 from mpm.errors import FULL, InputError, StorageError
 from mpm.files import write_atomically
 from mpm.sweep import guard
@@ -152,8 +153,8 @@ def error_of(record: Mapping[str, Any], layout: Layout, name: str) -> str:
 
 
 def is_full(line: str) -> bool:
-    """Whether a point's last line tells of a full or failing disk."""
-    return any(os.strerror(number) in line for number in FULL)
+    """Whether a point's last line tells of a full or failing disk, or there is none, as when the log is on that disk."""
+    return not line or any(os.strerror(number) in line for number in FULL)
 
 
 _slot = threading.local()
@@ -197,6 +198,15 @@ def attempt(task: Task, number: int, resume: bool, watch: Watch) -> int:
         watcher.join()
 
 
+def refuse_changed_profile(path: Path, name: str) -> None:
+    """InputError when the profile file of a point is no longer the one that gave the point its name."""
+    case = load_case(path)
+    if case.motion.table is not None and case.content_hash()[: len(name)] != name:
+        raise InputError(
+            f"{case.motion.profile} has changed since this sweep was planned; start it again: its points are then those of the new profile"
+        )
+
+
 def run_point(task: Task) -> dict[str, Any]:
     """Bring one point to a verdict and return its record; at once when it has one, or when the driver has gone.
 
@@ -210,6 +220,7 @@ def run_point(task: Task) -> dict[str, Any]:
         )
     if program() != task.program:
         raise InputError(f"worker {os.uname().nodename} has {program()}, the driver has {task.program}")
+    refuse_changed_profile(layout.case(task.name), task.name)
     run, record = layout.run(task.name), layout.record(task.name)
     watch = Watch(layout.driver / "lease", task.lease)
     before = read_json(record)

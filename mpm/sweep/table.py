@@ -10,6 +10,7 @@ import csv
 import fnmatch
 import io
 import json
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -57,7 +58,7 @@ def flatten(summary: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
             numbers |= flatten(value, f"{name}.")
         elif isinstance(value, list):
             numbers |= flatten({str(index): item for index, item in enumerate(value)}, f"{name}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
+        elif isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
             numbers[name] = value
     return numbers
 
@@ -138,8 +139,12 @@ def load_sweep(directory: str | Path) -> "xr.Dataset | pd.DataFrame":
             directory, "", "no sweep", "a directory that `mpm sweep` wrote, with sweep.json and results.csv"
         )
     words = {"status", "error", "point", *(axis["name"] for axis in about["axes"] if axis["kind"] == "word")}
-    with table.open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
+    text = table.read_text(encoding="utf-8")
+    rows = list(csv.DictReader(io.StringIO(text)))
+    if not text.endswith("\n") or not rows or set(about["columns"]) - rows[0].keys():
+        raise InputError.at(
+            table, "", "a table that is cut or is not of this sweep.json", "the table that `mpm sweep` wrote"
+        )
     frame = pd.DataFrame(
         {
             column: [row[column] if column in words else float(row[column] or "nan") for row in rows]

@@ -22,7 +22,7 @@ import json, os, signal, sys, time, tomllib
 from pathlib import Path
 
 case, out, resume = tomllib.loads(Path(sys.argv[1]).read_text()), Path(sys.argv[3]), "--resume" in sys.argv
-gamma, speed = case["motion"]["gamma"], float(case["motion"]["bed_velocity"].split()[0])
+gamma, speed = case["motion"]["gamma"], float(case["motion"].get("bed_velocity", "1").split()[0])
 out.mkdir(parents=True, exist_ok=True)
 stop = []
 signal.signal(signal.SIGINT, lambda *_: stop.append(True))
@@ -34,6 +34,9 @@ def note(what):
 note("start")
 if gamma == 0.77:
     print("error: step 3: the coverage's Newton iteration stalls at residual 1e-2", file=sys.stderr)
+    sys.exit(3)
+if gamma == 0.44:
+    print(f"{out}/history.csv: No space left on device", file=sys.stderr)
     sys.exit(3)
 if gamma == 0.66:
     print("error: this input only the solver can refuse", file=sys.stderr)

@@ -1,12 +1,22 @@
 """What a sweep leaves: the table in its three forms, `load_sweep`, pictures."""
 
+import errno
 import json
+import time
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import mpm
+from mpm.errors import InputError
+from mpm.sweep import driver
+from mpm.sweep.cluster import Pool
+from mpm.sweep.layout import Layout
+from mpm.sweep.plan import plan
+from mpm.sweep.results import Results
+from mpm.sweep.sweepfile import read_sweep
+from mpm.sweep.table import flatten
 
 SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
 
@@ -65,3 +75,37 @@ def test_pictures(bench, gammas, speeds, more):
     assert status == 0, messages
     (picture,) = (bench.path / "out" / "plots").glob("*.png")
     assert picture.name == "cvd.rate_mean.png" and picture.stat().st_size > 5000
+
+
+def test_a_cut_table_is_refused_and_nan_is_an_empty_cell(bench):
+    """Fails when a number that lost its digits is read, or a NaN of an edited summary reaches the table."""
+    bench.sweep("[0.1, 0.2]")
+    assert bench.run()[0] == 0
+    table = bench.path / "out" / "results.csv"
+    whole = table.read_text()
+    for text in ("", whole[: len(whole) // 3], whole.replace("status", "state"), whole.rstrip("\n")):
+        table.write_text(text)
+        with pytest.raises(InputError, match="a table that is cut"):
+            mpm.load_sweep(bench.path / "out")
+    assert flatten({"a": float("nan"), "b": [1.0, float("inf")], "c": 2}) == {"b.0": 1.0, "c": 2}
+
+
+def test_a_table_that_cannot_be_written_stops_no_point(bench, monkeypatch, capsys):
+    """Fails when a full disk ends the driver while points still run, or large tables are written back to back."""
+    calls = []
+
+    def full(*_: object) -> None:
+        calls.append(time.monotonic())
+        time.sleep(0.05)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    bench.sweep("[0.1]")
+    sweep = read_sweep(bench.path / "sweep.toml")
+    collector = driver.Collector(
+        Results(sweep, plan(sweep), Layout(bench.path / "out")), Pool(None, lambda: 1, ""), False
+    )
+    monkeypatch.setattr(driver, "write_csv", full)
+    monkeypatch.setattr(driver, "SAVE_EVERY", 0.0)
+    collector._save()
+    assert "No space left on device" in capsys.readouterr().err
+    assert collector._next_save >= calls[0] + 0.05 / driver.SAVE_SHARE

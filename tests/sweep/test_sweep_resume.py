@@ -101,3 +101,42 @@ def test_a_changed_case_and_a_changed_program_are_said(bench):
         "2 earlier points in" in messages
         and "do not belong to this sweep any more; they are kept" in messages
     )
+
+
+def test_a_point_that_the_disk_failed_is_tried_again(bench):
+    """Fails when want of disk space counts as the point's own numerical failure, a verdict that keeps it from being run again."""
+    bench.sweep("[0.1, 0.44, 0.77]")
+    for attempts in (1, 2):
+        status, messages = bench.run()
+        assert status == 3, messages
+        table = bench.table().set_index("gamma")
+        assert table.status.tolist() == ["done", "crashed", "failed"]
+        assert "No space left on device" in table.error[0.44]
+        starts = bench.names("start")
+        assert starts[table.point[0.44]] == attempts and starts[table.point[0.77]] == 1
+
+
+def test_a_profile_that_changes_ends_the_sweep_and_makes_new_points(bench):
+    """Fails when points that were named after one profile file run with another, or the next call takes their results over."""
+    profile = bench.path / "p.csv"
+
+    def write(speed: float) -> None:
+        rows = "".join(f"{phase},{speed},0,1\n" for phase in range(0, 360, 30))
+        profile.write_text(f"phase_deg,u_x_m/s,u_y_m/s,contact\n{rows}")
+
+    write(0.01)
+    bench.delay = 1.0
+    fixed = f'[sweep.set]\n"motion.profile" = "{profile}"\n'
+    (bench.path / "sweep.toml").write_text(
+        '[sweep]\ncase = "single_zone"\npictures = []\n[[sweep.axis]]\nkey = "motion.gamma"\nname = "gamma"\n'
+        f"values = [0.1, 0.2, 0.3]\n{fixed}"
+    )
+    driver = bench.start(jobs=1)
+    bench.wait_for(lambda: len(bench.events("step")) > 3)
+    write(0.02)
+    _, messages = driver.communicate(timeout=60)
+    assert driver.returncode == 2 and f"{profile} has changed" in messages.splitlines()[-1], messages
+    assert len(bench.events("start")) == 1
+    bench.delay = 0.1
+    assert bench.run()[0] == 0
+    assert set(bench.table().status) == {"done"} and len(bench.names("start")) == 4
