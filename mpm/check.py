@@ -209,13 +209,14 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
                 f"inlet {inlet.name} feeds a mass fraction of {feed:.3g}, not dilute (above {DILUTE}): density and "
                 "viscosity stay those of the carrier"
             )
+    layers = {layer.name: layer.material for layer in case.geometry.layers if layer.material is not None}
     for name, pores in report["pores"].items():
         kn = pores.get("Knudsen", math.inf)
         if kn > CONTINUUM:
             found.append(
                 f"layer {name}: Kn = {kn:.2g}, mean free path {_free_path(case) * 1e6:.2g} um over pores of "
-                f"{pores['diameter'] * 1e6:.3g} um: outside the continuum (above {CONTINUUM:g}) gas slips along the walls; permeability "
-                f"should be about 1 + 8 Kn = {1.0 + 8.0 * kn:.3g} times as large (Klinkenberg), D_eff smaller"
+                f"{eng.pore_diameter(layers[name]) * 1e6:.3g} um: outside the continuum (above {CONTINUUM:g}) gas slips along the walls; "
+                f"permeability should be about 1 + 8 Kn = {1.0 + 8.0 * kn:.3g} times as large (Klinkenberg), D_eff smaller"
             )
     courant = report["run"].get("flow_courant", math.inf)
     if courant > 1.0 and case.fidelity != "steady":

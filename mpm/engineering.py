@@ -35,9 +35,8 @@ def excess_number(
     site_density: float,
 ) -> float:
     """Precursor molecules fed per surface site that passes, gamma = v w C / (|u_bed| h S n_s) (thesis, 5-20)."""
-    return (
-        velocity * width * concentration / (abs(bed_velocity) * bed_height * surface_to_volume * site_density)
-    )
+    sites = abs(bed_velocity) * bed_height * surface_to_volume * site_density
+    return velocity * width * concentration / sites if sites > 0.0 else math.inf
 
 
 def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float | None] | None:

@@ -6,6 +6,7 @@ surface until none of its reactions is left, and count.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from mpm.chemistry import Mechanism, SurfaceReaction
@@ -83,7 +84,7 @@ def molecules_per_site(
     own = {r.site for r in mechanism.half_reactions(species)}
     reacting = sum(met.get(site, 0.0) for site in own)
     after = saturate(mechanism, species, met, temperature)
-    return None if after is None else after[1] / reacting
+    return None if after is None or not math.isfinite(after[1]) else after[1] / reacting
 
 
 def uptake(mechanism: Mechanism, species: str, coverage: Mapping[str, float], temperature: float) -> float:
