@@ -180,3 +180,13 @@ def test_bond_numbers_are_those_of_the_base_that_is_simulated():
     assert flat["bond_number_base"] == flat["simulated_bond_number_base"] == pytest.approx(76.0, rel=0.01)
     none = bond_numbers(build(load_case(case, {"box.cohesion": False}), 1)[0])
     assert set(none.values()) == {0.0}
+
+
+@pytest.mark.parametrize(
+    "change", [{"box.length": 1e9}, {"box.height": 1e20}, {"box.base": "frit", "box.frit_diameter": "1 nm"}]
+)
+def test_a_box_that_no_memory_holds_is_refused(change):
+    """Fails when a slip of a unit fills the memory instead of being named."""
+    case = {"powder": "GL56", "waveform": {"kind": "sine", "gamma": 0.3, "frequency": "16 Hz"}}
+    with pytest.raises(InputError, match=r"box: found a box of about .* up to 5,000,000"):
+        load_case(case, change)

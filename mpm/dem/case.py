@@ -13,15 +13,13 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from mpm.caseio import read_toml
 from mpm.errors import InputError
 from mpm.units import (
-    Angle,
     Density,
     Dimension,
-    Frequency,
     Length,
     MolarMass,
     NonNegative,
@@ -34,25 +32,21 @@ from mpm.units import (
     reject,
 )  # fmt: skip
 
-from ..constants import GRAVITY
-from .accelerometer import fit_record, read_record
 from .powder import POWDERS, SMALLEST, Powder
 from .reading import one_line, set_dotted
 from .relations import ideal_gas_density, mean_free_path
-from .waveform import Harmonic, HarmonicWaveform, Sawtooth, Waveform, from_table, seed_table_2_2, sine
+from .waveform import Waveform
+from .waveform_input import MeasuredInput, Section, WaveformInput
 
 MOST_SEEDS = 10_000
-Acceleration = Annotated[float, Dimension("m/s^2", "an acceleration", "10.581 m/s^2")]
 Stiffness = Annotated[float, Dimension("N/m", "a spring stiffness", "30 N/m", above=0.0)]
 Hamaker = Annotated[float, Dimension("J", "a Hamaker constant", "3.1e-20 J", at_least=0.0)]
 Spread = Annotated[float, Dimension("m", "a standard deviation", "13.9 um", at_least=0.0)]
 Tilt = Annotated[float, Dimension("rad", "an angle", "3 deg", at_least=-math.pi / 4, at_most=math.pi / 4)]
-Inclination = Annotated[float, Dimension("rad", "an angle", "60 deg", above=0.0, below=math.pi / 2)]
 Restitution = Annotated[float, Dimension("", "a coefficient of restitution", "0.97", above=0.0, at_most=1.0)]
 
-
-class Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+MOST_PARTICLES = 5_000_000
+"""More would take days for a cycle, and a box of some billions, by a slip of a unit, all memory before a word is said."""
 
 
 class PowderInput(Section):
@@ -98,94 +92,6 @@ class PowderInput(Section):
             return replace(powder, name=f"{self.base} (changed)", measured_umf=None, **given)
         defaults: dict[str, Any] = {"deviation": 0.0, "sphericity": 1.0, "source": "given in the powder file"}
         return Powder(name="powder", **{**defaults, **given})
-
-
-class SineInput(Section):
-    """A pure sine of the vertical acceleration `gamma` g."""
-
-    kind: Literal["sine"]
-    gamma: Positive
-    frequency: Frequency
-    angle: Inclination = math.pi / 3
-    angle_from: Literal["horizontal", "vertical"] = "horizontal"
-
-    def build(self, directory: Path) -> Waveform:
-        return sine(self.gamma, self.frequency, self.angle, self.angle_from)
-
-
-class SawtoothInput(Section):
-    """The pseudo-sawtooth with the displacement of a sine of the vertical acceleration `gamma` g."""
-
-    kind: Literal["sawtooth"]
-    gamma: Positive
-    frequency: Frequency
-    angle: Inclination = math.pi / 4
-    angle_from: Literal["horizontal", "vertical"] = "horizontal"
-    extension_ratio: Annotated[float, Dimension("", "f_a/f_1", "0.6667", above=0.5, below=1.0)] = 2.0 / 3.0
-
-    def build(self, directory: Path) -> Waveform:
-        like = sine(self.gamma, self.frequency, self.angle, self.angle_from)
-        x, z = (
-            h[0].amplitude / (2.0 * math.pi * self.frequency) ** 2 for h in (like.horizontal, like.vertical)
-        )
-        return Sawtooth(x, z, self.frequency, self.extension_ratio)
-
-
-class SeedInput(Section):
-    """The seed's table 2.2: the first `harmonics` of each direction, scaled to the fundamental `gamma` g."""
-
-    kind: Literal["seed"]
-    harmonics: Annotated[int, Field(ge=1, le=3)] = 3
-    gamma: Positive | None = None
-
-    def build(self, directory: Path) -> Waveform:
-        full = seed_table_2_2()
-        cut = HarmonicWaveform(
-            full.horizontal[: self.harmonics], full.vertical[: self.harmonics], full.frequency
-        )
-        return cut if self.gamma is None else cut.scaled(self.gamma * GRAVITY / full.vertical[0].amplitude)
-
-
-class HarmonicInput(Section):
-    amplitude: Acceleration
-    frequency: Frequency
-    phase: Angle = -math.pi / 2
-
-
-class HarmonicsInput(Section):
-    """Lists of harmonics, `[[waveform.horizontal]]` and `[[waveform.vertical]]`; A cos(2 pi f t - phase)."""
-
-    kind: Literal["harmonics"]
-    frequency: Frequency
-    horizontal: tuple[HarmonicInput, ...]
-    vertical: tuple[HarmonicInput, ...]
-
-    def build(self, directory: Path) -> Waveform:
-        horizontal, vertical = (
-            tuple(Harmonic(h.amplitude, h.frequency, h.phase) for h in row)
-            for row in (self.horizontal, self.vertical)
-        )
-        return HarmonicWaveform(horizontal, vertical, self.frequency).aligned()
-
-
-class MeasuredInput(Section):
-    """Accelerations from a CSV file of t, a_x, a_z: one period (`table`) or a record to be fitted."""
-
-    kind: Literal["table", "accelerometer"]
-    file: str
-    harmonics: Annotated[int, Field(ge=1, le=64)] | None = None
-    unit: Literal["m/s^2", "g"] = "m/s^2"
-
-    def build(self, directory: Path) -> Waveform:
-        record = read_record(directory / self.file, self.unit)
-        if self.kind == "accelerometer":
-            return fit_record(record, self.harmonics or 3)[0]
-        return from_table(record.t, record.acceleration, harmonics=self.harmonics or 16)
-
-
-WaveformInput = Annotated[
-    SineInput | SawtoothInput | SeedInput | HarmonicsInput | MeasuredInput, Field(discriminator="kind")
-]
 
 
 class BoxInput(Section):
@@ -300,6 +206,19 @@ class DemCase(Section):
             and self.box.baffle_width > self.box.length * self.build_powder().diameter
         ):
             raise reject(f"{self.box.baffle_width:g} m", "up to box.length", key="box.baffle_width")
+        return self
+
+    @model_validator(mode="after")
+    def can_be_held(self) -> "DemCase":
+        box, d = self.box, self.build_powder().diameter
+        bed = 0.6 * box.length * box.depth * box.height / (math.pi / 6.0)
+        glued = 0.0 if box.base == "flat" else box.length * box.depth * (d / box.frit_diameter) ** 2
+        if bed + glued > MOST_PARTICLES:
+            raise reject(
+                f"a box of about {bed:.2g} particles on {glued:.2g} glued ones",
+                f"up to {MOST_PARTICLES:,} in all",
+                key="box",
+            )
         return self
 
     @model_validator(mode="after")

@@ -320,3 +320,16 @@ def test_documented_sweep_is_valid(tmp_path):
     kept = [point.numbers for point in plan(read)]
     assert len(kept) == 8 and all(width <= 2 * height for width, height in kept)
     assert slurm_options(read.slurm, 1, tmp_path)["job_cpu"] == 8
+
+
+@pytest.mark.parametrize(
+    ("head", "values", "key"),
+    [
+        ("", "linspace = { start = 0.1, stop = 0.3, num = 1000000000 }", "num"),
+        ('mode = "sample"\nsamples = 1000000000', "linspace = { start = 0.1, stop = 0.3 }", "samples"),
+    ],
+)
+def test_more_points_than_a_table_can_hold_are_refused(tmp_path, head, values, key):
+    """Fails when the points of a slip (a number of samples with zeros too many) fill the memory before anything is said."""
+    with pytest.raises(InputError, match=f"{key}.*: found 1000000000"):
+        read_sweep(sweep_file(tmp_path, axis("motion.gamma", values), head))
