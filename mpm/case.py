@@ -373,6 +373,17 @@ class Case(Frozen):
         """The file the case was read from, if any."""
         return self._source
 
+    def typed(self, table: str) -> set[str]:
+        """Keys below the dotted name of a table, such as `material.glass_beads`, that the file itself or an override gives."""
+        data, overrides, _, _ = self._origin
+        node: Any = data
+        for part in table.split("."):
+            node = node.get(part) if isinstance(node, Mapping) else None
+        below = {
+            key.removeprefix(f"{table}.").split(".")[0] for key in overrides if key.startswith(f"{table}.")
+        }
+        return below | (set(node) if isinstance(node, Mapping) else set())
+
     def with_(self, changes: Mapping[str, Any]) -> Case:
         """Return the case that the same file gives with these dotted keys changed; everything is checked anew."""
         data, overrides, folder, label = self._origin

@@ -17,6 +17,7 @@ from mpm.dem.relations import (
     wen_yu_minimum_fluidisation,
 )
 from mpm.geometry import Grid
+from mpm.idle import idle_keys
 from mpm.layout import Inlet, Layer
 from mpm.materials import Material
 from mpm.motion import Vibration
@@ -71,6 +72,7 @@ def check_case(case: Case) -> dict[str, Any]:
     bed = case.geometry.moving_layer
     if bed is not None:
         report["bed"] = _bed(case, bed)
+    report["without_effect"] = idle_keys(case)
     report["warnings"] = warnings(case, report)  # before anything is dropped that they speak of
     return {key: _finite(entry) for key, entry in report.items()}
 

@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 import time
-import tomllib
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ import typer
 from mpm.errors import InputError, Interrupted, MpmError, printable, storage_error
 from mpm.launcher import rank
 from mpm.screen import screen, spell_out
+from mpm.settings import parse_settings
 
 _PATIENCE = 30.0
 """Seconds that a failing rank waits for the others to fail as well before it ends the whole job."""
@@ -43,21 +43,6 @@ SetOption = Annotated[
         "--set", metavar="KEY=VALUE", help="override a key, e.g. geometry.inlet.tma.velocity='4 cm/s'"
     ),
 ]
-
-
-def parse_settings(settings: Sequence[str] | None) -> dict[str, Any]:
-    """Split `KEY=VALUE` arguments; a value is TOML if it can be read as such, else a string."""
-    overrides: dict[str, Any] = {}
-    for setting in settings or ():
-        key, equals, text = setting.partition("=")
-        if not equals or not key.strip():
-            raise InputError.at("--set", "", repr(setting), "KEY=VALUE, e.g. motion.gamma=0.4", given="")
-        try:
-            table = tomllib.loads(f"value = {text}")
-        except tomllib.TOMLDecodeError:
-            table = {"value": text}
-        overrides[key.strip()] = table["value"] if len(table) == 1 else text
-    return overrides
 
 
 @app.callback(invoke_without_command=True)

@@ -29,6 +29,8 @@ def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
         listing.print(console)
     for reaction in report["reactions"]:
         console.print(printable(reaction))
+    for sentence in report["without_effect"]:
+        console.print(Text("has no effect: ", style="yellow").append(printable(sentence), style="default"))
     for warning in report["warnings"]:
         console.print(Text("warning:", style="yellow").append(f" {printable(warning)}", style="default"))
 

@@ -38,7 +38,7 @@ MESH: dict[str, Any] = {
 
 def measure() -> dict[str, dict[str, float]]:
     """Mean CVD rate [mol/m3/s], CVD events over all fed TMA, and exit coverages, by "TMA ratio,water ratio"."""
-    found: dict[str, dict[str, float]] = json.loads(KEPT.read_text()) if KEPT.exists() else {}
+    found: dict[str, dict[str, float]] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
     base = load_case(ROOT / "cases" / "single_cycle.toml", MESH)
     saturating = {}  # mass fractions at which the dose ratio is 1; the ratio is proportional to them
     for inlet in base.geometry.inlets:

@@ -162,7 +162,7 @@ def markdown(out: Path) -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, (what, expected, _) in ROWS.items():
-        found = [json.loads(p.read_text()) for p in sorted(out.glob(f"{name}_k*_s*.json"))]
+        found = [json.loads(p.read_text(encoding="utf-8")) for p in sorted(out.glob(f"{name}_k*_s*.json"))]
         for stiffness in sorted({r["stiffness"] for r in found}):
             runs = [r for r in found if r["stiffness"] == stiffness]
             speeds = [100.0 * r["mean_velocity"] for r in runs]

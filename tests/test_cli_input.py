@@ -11,6 +11,7 @@ import pytest
 from mpm.caseio import built_in_files
 from mpm.cli import main
 from mpm.dem.case import load_case as load_powder
+from mpm.settings import parse_settings
 from mpm.sweep.sweepfile import read_sweep
 
 PROFILE = "phase_deg,u_x_m/s,u_y_m/s,contact\n0,0.01,0,1\n90,0.02,0,1\n180,0.01,0,0\n270,0.0,0,0\n"
@@ -489,3 +490,16 @@ def test_the_example_itself_is_accepted(folder: Path, capsys: pytest.CaptureFixt
     (folder / "case.toml").write_text(EXAMPLE)
     assert main(["check", "case.toml"]) == 0
     assert "28,359 cells" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["[" * 3000, "9" * 5000, "1\nx = 2", "\x1b[2J", "=", "{a=1"])
+def test_settings_that_are_no_toml_are_text(text: str) -> None:
+    """Fails when a value of --set ends in a traceback, or sets a second key."""
+    assert parse_settings([f"motion.gamma={text}"]) == {"motion.gamma": text}
+
+
+def test_settings_in_another_encoding_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when the bytes of a Latin-1 shell reach a file, which is UTF-8."""
+    assert "can be written as UTF-8" in refused(
+        capsys, folder, "check", "single_zone", "--set", "title=caf\udce9"
+    )

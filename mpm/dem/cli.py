@@ -2,7 +2,6 @@
 
 import json
 import os
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,9 +9,12 @@ import typer
 from typer.core import TyperGroup
 
 from mpm.errors import InputError
+from mpm.launcher import rank
+from mpm.settings import parse_settings
 
 from .accelerometer import fit_record, read_record, resample, spectrum
 from .case import load_case
+from .idle import idle_keys
 from .waveform import HarmonicWaveform, extension_velocity, peak_displacement
 
 SLIP = 0.01
@@ -59,11 +61,14 @@ def run(
     """Simulate a vibrated powder bed; write profile.csv, summary.json, maps and pictures."""
     if resume and overwrite:
         raise InputError("mpm dem: --resume and --overwrite exclude each other")
-    case = load_case(powder, _overrides(settings or []))
+    case = load_case(powder, parse_settings(settings, "box.stiffness='3 N/m'"))
     case.build_waveform()  # a bad data file is bad input: say so before anything is written
     if jobs is not None and jobs < 1:
         raise InputError(f"mpm dem: --jobs: found {jobs}; accepted: a number from 1")
     directory = output or Path("results") / powder.stem
+    if rank() == 0 and not quiet:
+        for sentence in idle_keys(case):
+            typer.echo(f"mpm dem: has no effect: {sentence}", err=True)
 
     from .box import load_lammps
 
@@ -189,19 +194,3 @@ def waveform(
                 f"  {h.amplitude:8.3f} m/s2 at {h.frequency:8.3f} Hz, phase {h.phase:+.3f} rad (FFT amplitude x {c:.3f})"
             )
     typer.echo(f"written {directory / 'waveform.toml'} (for a powder file), waveform.json, waveform.png")
-
-
-def _overrides(settings: list[str]) -> dict[str, Any]:
-    """KEY=VALUE arguments; a value is TOML if it can be read as such, else a string."""
-    out: dict[str, Any] = {}
-    for setting in settings:
-        key, equals, text = setting.partition("=")
-        if not equals or not key.strip():
-            raise InputError(
-                f"mpm dem: --set: found {setting!r}; accepted: KEY=VALUE, e.g. box.stiffness='3 N/m'"
-            )
-        try:
-            out[key.strip()] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            out[key.strip()] = text
-    return out

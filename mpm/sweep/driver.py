@@ -68,6 +68,8 @@ def run_sweep(
     jobs = jobs or max(1, len(os.sched_getaffinity(0)) // ranks)
     if ranks > 1 and not command:
         mpirun()
+    if sweep.idle:
+        say(f"has no effect in mode {sweep.mode}: {', '.join(sweep.idle)}")
     points = plan(sweep)
     layout = Layout(Path(output or Path("results") / sweep.path.stem).absolute())
     if layout.root.exists() and not layout.driver.exists() and any(layout.root.iterdir()):

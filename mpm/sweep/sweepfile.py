@@ -92,6 +92,8 @@ class Sweep:
     seed: int
     ranks: int
     slurm: Mapping[str, Any]
+    idle: tuple[str, ...]
+    """Keys that the file gives and that its mode does not read."""
 
 
 def _known(path: Path, where: str, table: Mapping[str, Any], keys: Sequence[str]) -> None:
@@ -219,6 +221,16 @@ def _base(path: Path, name: str, fixed: Mapping[str, Any]) -> Case:
         raise InputError(f"{path}: sweep.case: {error}") from None
 
 
+def _idle(mode: str, table: Mapping[str, Any], items: Sequence[Any], axes: Sequence[Axis]) -> tuple[str, ...]:
+    if mode != "sample":
+        return tuple(f"sweep.{key}" for key in ("samples", "method", "seed") if key in table)
+    ranges = [
+        (axis, item.get("linspace") or item.get("logspace") or {})
+        for axis, item in zip(axes, items, strict=True)
+    ]
+    return tuple(f"sweep.axis ({axis.name}).num" for axis, ends in ranges if "num" in ends)
+
+
 def read_sweep(source: str | Path) -> Sweep:
     """Parse and check a sweep file and its base case; InputError for everything wrong with either."""
     path = Path(source)
@@ -273,4 +285,5 @@ def read_sweep(source: str | Path) -> Sweep:
         seed=_at_least(path, "seed", table, 0, 0),
         ranks=_at_least(path, "ranks", table, 1, 1),
         slurm=_slurm(path, _take(path, "sweep", table, "slurm", dict, {})),
+        idle=_idle(mode, table, items, axes),
     )

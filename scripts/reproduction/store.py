@@ -91,7 +91,7 @@ class Lab:
 
     def _done(self, directory: Path) -> bool:
         summary = directory / "summary.json"
-        return summary.exists() and json.loads(summary.read_text())["status"] == "done"
+        return summary.exists() and json.loads(summary.read_text(encoding="utf-8"))["status"] == "done"
 
     def arrays(self, case: Case, kind: str, make: Callable[[], Arrays]) -> Arrays:
         """Arrays that depend on `case` and `kind` alone, kept in one file."""
@@ -117,5 +117,7 @@ class Lab:
 
     def kept(self, name: str) -> dict[str, Any]:
         """What `keep` has written. Raises FileNotFoundError when there is nothing."""
-        content: dict[str, Any] = json.loads((self.folder / "rows" / f"{name}.json").read_text())
+        content: dict[str, Any] = json.loads(
+            (self.folder / "rows" / f"{name}.json").read_text(encoding="utf-8")
+        )
         return content
