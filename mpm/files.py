@@ -83,7 +83,7 @@ def replacing(path: str | os.PathLike[str], ending: str = ".tmp") -> Iterator[Pa
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            error.filename, error.filename2 = str(path), None
+            raise OSError(error.errno, error.strerror, str(path)) from error
         raise
 
 

@@ -54,7 +54,7 @@ def test_a_coarse_zone_with_a_failing_and_a_refused_point(tmp_path):
     assert status == 0, messages
     data = mpm.load_sweep(tmp_path / "out")
     assert data.status.tolist() == ["done", "done", "failed", "bad_input"]
-    assert data.error[2].startswith("flow") and "1.5" in data.error[3]
+    assert data.error[2].startswith("steady flow") and "1.5" in data.error[3]
     assert data.attrs["units"]["species.TMA.fed"] == "mol/m"
     low, high, *none = data["species.TMA.fed"]
     assert high / low == pytest.approx(2.0, rel=1e-3) and np.isnan(none).all()
