@@ -152,7 +152,10 @@ def plot(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the dire
     for path in paths:
         print(path)
     if not paths:
-        print(f"{directory}: no output yet, nothing to draw", file=sys.stderr)
+        print(
+            f"{directory}: holds nothing that is drawn: no fields of species or coverage, no history",
+            file=sys.stderr,
+        )
 
 
 @app.command()

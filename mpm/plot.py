@@ -132,7 +132,8 @@ def pictures(
         if exits(run):
             yield "exit_profile", partial(exit_profile_figure, run, fields)
     if len(run.history.get("time", ())) > 1:
-        yield "history", partial(history_figure, run)
+        if any(key.startswith(("titration.", "balance.", "elements.")) for key in run.history):
+            yield "history", partial(history_figure, run)
         if any(outlet_species(run, outlet.name) for outlet in run.case.geometry.outlets):
             yield "outlets", partial(outlets_figure, run)
     elif len(run.times) > 1:

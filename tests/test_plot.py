@@ -325,6 +325,13 @@ def figure_times(run: Run) -> set[str]:
     return {str(line.get_label()) for line in figure.axes[0].get_lines()}
 
 
+def test_a_history_without_balances_is_no_picture(zone: Run) -> None:
+    """Fails when the history of a run without species, which holds no titration and no balance, ends in a traceback."""
+    file = zone.directory.path / "history.csv"
+    file.write_text("time,cvd.rate_mean\n0.0,0.0\n1.0,0.0\n")
+    assert pictures_of(zone.directory.path)[0] == ALL - {"history", "outlets"}
+
+
 def test_fields_of_another_mesh_are_not_drawn(zone: Run, tmp_path: Path) -> None:
     """Fails when a case.toml of another mesh beside the fields ends in a traceback or in a picture."""
     other = load_case("single_zone", {"geometry.cell_width": "3 mm"})
