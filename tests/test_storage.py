@@ -2,6 +2,7 @@
 
 import ctypes
 import errno
+import logging
 import os
 import subprocess
 import sys
@@ -10,10 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mpm.dem.case import load_case as load_powder
+from mpm.dem.run import prepare
 from mpm.errors import InputError, StorageError, storage_error
 from mpm.files import lock, replacing, write_atomically, write_in_place
 from mpm.mesh import write_msh
 from mpm.output import RunDirectory
+from mpm.progress import log_file
 from mpm.reactor import Reactor
 
 from .cases import MPI, SHORT, TINY, run, zone
@@ -102,6 +106,38 @@ def test_a_full_disk_keeps_the_last_state(
     _, resumed = run(CASE, output=tmp_path / "run", resume=True)
     for name, values in whole.history.items():
         np.testing.assert_array_equal(resumed.history[name], values)
+
+
+def test_a_log_on_a_full_disk_is_silent(capfd: pytest.CaptureFixture[str]) -> None:
+    """Fails when each message that the log has no room for prints a traceback of logging, or closing it ends the run."""
+    log = logging.getLogger("mpm.test")
+    with log_file(log, Path("/dev/full")):
+        log.info("nothing of this fits")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_standard_output_on_a_full_disk() -> None:
+    """Fails when a table that is cut in a pipe or file counts as printed."""
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "mpm", "schema"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert (done.returncode, done.stderr) == (3, "mpm: No space left on device\n")
+
+
+def test_one_powder_run_at_a_time(tmp_path: Path) -> None:
+    """Fails when two `mpm dem` share a directory, or one that is over keeps it closed."""
+    case = load_powder(Path(__file__).parents[1] / "cases" / "dem" / "demo.toml")
+    held = prepare(case, tmp_path, resume=False, overwrite=False)
+    for way in ((True, False), (False, True)):
+        with pytest.raises(InputError, match="another mpm dem is at work"):
+            prepare(case, tmp_path, *way)
+    held.close()
+    prepare(case, tmp_path, resume=True, overwrite=False).close()
 
 
 LIMITED = """
