@@ -47,6 +47,8 @@ RESERVED_LAYERS = ("height",)
 """Names beside those of layers under `front.INLET` in the results."""
 MOST_CELLS = 100_000_000
 """A mesh beyond this is a slip of the unit, not a plan."""
+MOST_ROWS = 100_000
+"""The same for the rows of a layer."""
 STEEPEST = 100.0
 """Grading, or one over it, up to which gmsh places the rows of a layer where they belong (to 1e-4 of a row)."""
 FINEST = 1e-7
@@ -83,7 +85,7 @@ def _write_windows(pairs: tuple[tuple[float, float], ...]) -> list[list[Any]]:
 
 Name = Annotated[str, AfterValidator(_name)]
 Flag = Annotated[bool, Strict()]
-Count = Annotated[int, Strict(), Field(ge=1, le=MOST_CELLS)]
+Count = Annotated[int, Strict(), Field(ge=1, le=MOST_ROWS)]
 Windows = Annotated[
     tuple[tuple[float, float], ...],
     PlainValidator(_read_windows),

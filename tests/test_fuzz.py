@@ -57,6 +57,7 @@ LAYER = {"name": "gas", "height": "1 mm", "cells": 2}
         ({"motion": {"gamma": 10**400}}, "motion.gamma: found 1000000"),
         ({"motion": {"gamma": 1e300}}, "of a size from 1e-30 to 1e+30"),
         ({"geometry": {"layer": [{**LAYER, "cells": 10**400}]}}, "layer.gas.cells: found 1000000"),
+        ({"geometry": {"layer": [{**LAYER, "cells": 3_000_000}]}}, "less than or equal to 100000"),
         ({"geometry": {"layer": [{**LAYER, "grading": 1e30}]}}, "0.01 to 100"),
         ({"geometry": {"layer": [LAYER, {**LAYER, "name": "b", "height": "1e25 m"}]}}, "rows above"),
         ({"chemistry": {"reaction": {"cvd": {"Ea": "-1e9 kJ/mol"}}}}, "rate constant of inf"),
