@@ -189,10 +189,13 @@ _SUMMARY = {
 
 def print_summary(summary: dict[str, Any], console: Console) -> None:
     """Print the figures of a summary that one looks at first, and the worst balance."""
-    table = Listing("quantity", "of", "value")
+    from mpm.sweep.table import unit_of
+
+    table, steady = Listing("quantity", "of", "value", "unit"), summary.get("fidelity") == "steady"
     for section, title in _SUMMARY.items():
         for name, value in _numbers(summary.get(section, {})):
-            table.add_row(title, name, f"{value:.4g}")
+            unit = unit_of(f"{section}.{name.replace(' ', '.')}", steady)
+            table.add_row(title, name, f"{value:.4g}", "" if unit == "1" else unit)
     table.print(console)
     balances = [(name, value) for name, value in _numbers(summary) if name.endswith("balance_error")]
     if balances:

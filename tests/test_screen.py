@@ -39,7 +39,7 @@ def test_no_terminal_cuts_a_number(width: int) -> None:
     for show, arguments, wanted in (
         (print_report, (case, check_case(case)), ("6.92e-08", "2.85 / 2.68", "sintered_powder", "104.775", "headspace")),
         (print_mesh, (case,), ("headspace", "139.7", "28,359", "102.775")),
-        (print_summary, (summary,), ("1.792", "1.234e-10")),
+        (print_summary, (summary,), ("1.792", "1.234e-10", "m^2/s")),
     ):  # fmt: skip
         text = text_of(width, show, *arguments)
         assert "…" not in text and "..." not in text

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 UNITS: tuple[tuple[str, str], ...] = (
-    (r"flow\.(inflow|outflow)", "m^2/s"),
+    (r"flow\.(inflow|outflow|outlets\..*)", "m^2/s"),
     (r"flow\.bed_superficial_velocity\.\d", "m/s"),
-    (r"flow\.\w+_pressure_drop", "Pa"),
+    (r"flow\.(\w+_pressure_drop|pressure_drop\..*)", "Pa"),
     (r"cvd\.rate_(mean|max)", "mol/m^3/s"),
     (r"(simulated|wall)_seconds", "s"),
     (r"front\..*", "m"),

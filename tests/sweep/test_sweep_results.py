@@ -16,7 +16,7 @@ from mpm.sweep.layout import Layout
 from mpm.sweep.plan import plan
 from mpm.sweep.results import Results
 from mpm.sweep.sweepfile import read_sweep
-from mpm.sweep.table import flatten
+from mpm.sweep.table import flatten, unit_of
 
 SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
 
@@ -109,3 +109,14 @@ def test_a_table_that_cannot_be_written_stops_no_point(bench, monkeypatch, capsy
     collector._save()
     assert "No space left on device" in capsys.readouterr().err
     assert collector._next_save >= calls[0] + 0.05 / driver.SAVE_SHARE
+
+
+def test_every_dimensional_number_of_the_flow_has_its_unit():
+    """Fails when the flow of an outlet or the drop over a layer is called a pure number, in sweep.json and on the screen."""
+    assert unit_of("flow.outlets.zone1", steady=False) == unit_of("flow.inflow", steady=False) == "m^2/s"
+    assert (
+        unit_of("flow.pressure_drop.bed", steady=True)
+        == unit_of("flow.bed_pressure_drop", steady=True)
+        == "Pa"
+    )
+    assert unit_of("flow.mass_error", steady=False) == "1"
