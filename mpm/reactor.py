@@ -21,7 +21,7 @@ from mpm.bed import Bed
 from mpm.check import check_case
 from mpm.diagnostics import State, Totals, total_concentration
 from mpm.dispersion import vibrational_dispersion
-from mpm.errors import ConvergenceError, InputError, Interrupted, StorageError, storage_error
+from mpm.errors import ConvergenceError, InputError, Interrupted, StorageError, printable, storage_error
 from mpm.flownumbers import flux_profiles
 from mpm.geometry import Grid
 from mpm.motion import BedMotion, step_motion
@@ -118,7 +118,7 @@ class Reactor:
         with log_file(log, file), Progress(self, progress) as bar, stop_signals(self._request_stop):
             log.info(
                 "%s: %s, %d cells, %d ranks",
-                self.case.title,
+                printable(self.case.title),
                 self.case.fidelity,
                 self.grid.cells,
                 self.comm.size,

@@ -10,8 +10,9 @@ from pydantic_core import PydanticCustomError
 
 from mpm.case import Case, load_case
 from mpm.chemistry import inlet_concentrations, mole_fractions
+from mpm.equation import parse_equation
 from mpm.errors import InputError
-from mpm.mechanism import parse_equation, parse_formula
+from mpm.mechanism import parse_formula
 
 EXAMPLE = Path(__file__).parent / "example_case.toml"
 R = 8.31446261815324
