@@ -49,9 +49,11 @@ with that in mind:
   regrouped after "not reproduced" on a coarse mesh, and **R3** was given a strip with closed ends beside the periodic one.
 * The burst of CVD that a delay removes (**R20**) exists at a port of 2.2 mm only; at 4.0 mm the rate climbs monotonically.
 
-All rows were measured with one revision of the program, on 2026-11-23. An earlier measurement, in which the bed of averaged runs
-still shook and more rows had coarser meshes, came to the same 23 verdicts. A stored run is named by its case, not by the program:
-delete `results/reproduce` to measure with another revision.
+All rows were measured with one revision of the program, on 2026-11-26, after the shear at the face of the moving bed had been corrected
+([CHANGELOG](../CHANGELOG.md)): gas at its surface now moves with the powder. Compared with the measurement before it, of 2026-11-23, that
+turned four verdicts. R14 holds now. In R17 the overshoot in zone 1 at 4.0 mm is gone. In R20 the delay leaves a burst at 2.2 mm. In R8 the
+order by Gamma holds with inlets at rest in the lab. A stored run is named by its case, not by the program: delete `results/reproduce` to
+measure with another revision.
 Explanations in the paragraphs for R14, R16 to R18 and R21 are interpretations that have not been tested on their own.
 
 """
