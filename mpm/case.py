@@ -37,7 +37,7 @@ from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
 from mpm.mechanism import Chemistry, build_mechanism, check_rates
 from mpm.messages import to_input_error
-from mpm.profile import BedProfile, read_profile
+from mpm.profile import PRESETS, BedProfile, read_profile
 from mpm.units import (
     Angle,
     Density,
@@ -198,7 +198,7 @@ class Motion(Frozen):
                 "an angle from 0 deg to 90 deg that leaves a vertical component",
                 key="angle",
             )
-        if self.profile not in ("thesis", "phases"):
+        if self.profile not in PRESETS:
             self._read_table()
         elif self.gamma == 0.0:
             pass  # nothing hops: a preset has no phases to check
@@ -364,6 +364,11 @@ class Case(Frozen):
         return -1 if self.geometry.moving_layer is not None and self.motion.mean_velocity < 0.0 else 1
 
     @property
+    def follows_cycle(self) -> bool:
+        """Whether the flow is found for every step of the vibration cycle, not for its mean alone."""
+        return self.fidelity == "resolved" or self.transport.vibrational_dispersion
+
+    @property
     def mechanism(self) -> Mechanism:
         """The reaction mechanism, overrides included."""
         return self._mechanism
@@ -402,7 +407,7 @@ class Case(Frozen):
     def content_hash(self) -> str:
         """Hexadecimal digest of everything that determines the results; a motion profile counts with its content."""
         content = self.to_dict()
-        if self.motion.profile not in ("thesis", "phases"):
+        if self.motion.profile not in PRESETS:
             content["motion"]["profile"] = read_text(self.motion.profile)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

@@ -18,6 +18,7 @@ import tomli_w
 from mpm.errors import InputError
 from mpm.files import is_file, read_text
 from mpm.materials import BUILT_IN
+from mpm.profile import PRESETS
 
 Table = dict[str, Any]
 
@@ -199,7 +200,7 @@ def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path
     _insert_materials(result, source)
     _spread_diffusivity(result)
     profile = _table(result, "motion").get("profile", "thesis")
-    if isinstance(profile, str) and profile not in ("thesis", "phases"):
+    if isinstance(profile, str) and profile not in PRESETS:
         path = folder / profile
         result["motion"]["profile"] = str(path.resolve() if is_file(path) else path)
     return result

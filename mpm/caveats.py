@@ -10,6 +10,7 @@ from mpm.diffusion import carrier_ratio, scaled_diffusivity
 from mpm.elements import formula_mass
 from mpm.gases import CARRIERS, ideal_gas_density
 from mpm.mechanism import parse_formula
+from mpm.profile import PRESETS
 
 if TYPE_CHECKING:
     from mpm.case import Case
@@ -35,7 +36,7 @@ def profile_caveats(case: Case) -> list[str]:
     """
     motion = case.motion
     name = Path(motion.profile).name
-    if motion.gamma == 0.0 and motion.profile not in ("thesis", "phases"):
+    if motion.gamma == 0.0 and motion.profile not in PRESETS:
         return [
             f"motion.profile, {name}, has no effect: without vibration (gamma = 0) the bed moves at bed_velocity"
         ]
@@ -107,12 +108,11 @@ def feed_caveats(case: Case) -> list[str]:
     """Inlets whose engineering numbers are of one of several precursors."""
     found = []
     for inlet in case.geometry.inlets:
-        species = case.mechanism.precursor(inlet.mass_fractions)
-        fed = [n for n, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reactions(n)]
-        if species is not None and len(fed) > 1:
+        fed = case.mechanism.precursors(inlet.mass_fractions)
+        if len(fed) > 1:
             found.append(
                 f"inlet {inlet.name} feeds several precursors, {', '.join(fed)}: its excess number, titration, utilisation and front are "
-                f"those of {species}"
+                f"those of {fed[0]}"
             )
     return found
 
@@ -124,7 +124,7 @@ def steady_caveats(case: Case) -> list[str]:
     return [
         f"inlet {inlet.name} stops dosing at {inlet.windows[-1][1]:g} s: in the steady state it blows carrier gas alone"
         for inlet in case.geometry.inlets
-        if any(inlet.mass_fractions.values()) and math.isfinite(inlet.windows[-1][1])
+        if any(inlet.mass_fractions.values()) and not inlet.stays_open
     ]
 
 

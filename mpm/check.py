@@ -221,7 +221,7 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
                 f"permeability should be about 1 + 8 Kn = {1.0 + 8.0 * kn:.3g} times as large (Klinkenberg), D_eff smaller"
             )
     courant = report["run"].get("flow_courant", math.inf)
-    if courant > 1.0 and case.fidelity != "steady":
+    if courant > 1.0 and case.follows_cycle:
         found.append(
             f"the gas passes {courant:.2g} cells in a step of the cycle (CFL above 1): raise time.steps_per_cycle"
         )

@@ -20,6 +20,7 @@ from mpm.errors import InputError
 from mpm.files import read_text
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, on_root, total
+from mpm.profile import PRESETS
 from mpm.replay import March, Replay, unpack
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def identity(case: Case) -> dict[str, Any]:
 
 
 def _profile(name: str) -> str:
-    return name if name in ("thesis", "phases") else _digest(read_text(name))
+    return name if name in PRESETS else _digest(read_text(name))
 
 
 def _digest(text: str) -> str:
@@ -179,9 +180,3 @@ def _differences(old: Any, new: Any, key: str = "") -> list[str]:
         keys = [*old, *(k for k in new if k not in old)]
         return [d for k in keys for d in _differences(old.get(k), new.get(k), f"{key}.{k}".lstrip("."))]
     return [] if old == new else [key]
-
-
-def rows(columns: dict[str, NDArray[np.float64]]) -> list[dict[str, float]]:
-    """Columns of a history (NaN where a row lacks one) as rows."""
-    count = len(columns.get("time", ()))
-    return [{k: float(v[i]) for k, v in columns.items() if not np.isnan(v[i])} for i in range(count)]

@@ -78,7 +78,11 @@ def one_at_a_time(compile_forms: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(compile_forms)
     def compile_here(forms: Any, options: Any = None, cache_dir: Any = None, **rest: Any) -> Any:
         cache = cache_directory()
-        with lock(cache / "lock", COMPILING) if os.access(cache, os.W_OK) else nullcontext():
+        try:
+            alone = lock(cache / "lock", COMPILING) if os.access(cache, os.W_OK) else nullcontext()
+        except BlockingIOError:
+            raise TimeoutError(f"another process has been compiling for {COMPILING:g} s") from None
+        with alone:
             for source in cache.glob("*.c"):
                 if not source.with_suffix(".c.cached").exists():
                     source.unlink(missing_ok=True)

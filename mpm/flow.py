@@ -285,7 +285,6 @@ class FlowProblem:
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
         ksp.setTolerances(rtol=1e-4, atol=0.0, max_it=200)
-        ksp.setOperators(matrix, stokes.matrix)
         ksp.setPC(stokes.ksp.getPC())
         ksp.setOperators(matrix, stokes.matrix)
         ksp.setGMRESRestart(30)

@@ -6,7 +6,7 @@ import csv
 import io
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -76,8 +76,13 @@ class History:
 
     def by_column(self) -> dict[str, NDArray[np.float64]]:
         """The columns; NaN where a cell is empty."""
-        columns = dict.fromkeys(key for row in self.rows for key in row)
-        return {key: np.array([row.get(key, math.nan) for row in self.rows]) for key in columns}
+        return columns_of(self.rows)
+
+
+def columns_of(rows: Sequence[Row]) -> dict[str, NDArray[np.float64]]:
+    """Rows as columns, in the order they were first seen; NaN where a row lacks one."""
+    columns = dict.fromkeys(key for row in rows for key in row)
+    return {key: np.array([row.get(key, math.nan) for row in rows]) for key in columns}
 
 
 def read_table(path: Path) -> list[Row]:

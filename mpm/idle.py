@@ -37,14 +37,15 @@ def _typed(model: Any, table: str, keys: Iterable[str], why: str) -> Idle:
 def _of_motion(case: Case) -> Idle:
     motion, dispersed = case.motion, case.transport.vibrational_dispersion
     if motion.gamma == 0.0:
-        yield from _typed(motion, "motion", _CYCLE[1:], "nothing vibrates (gamma = 0)")
+        cycle = _CYCLE[1:] if case.fidelity == "resolved" else _CYCLE  # whose steps are parts of a cycle
+        yield from _typed(motion, "motion", cycle, "nothing vibrates (gamma = 0)")
         yield from _typed(
             case.transport,
             "transport",
             ["vibrational_dispersion"] if dispersed else [],
             "nothing vibrates (gamma = 0)",
         )
-    elif case.fidelity != "resolved" and not dispersed:
+    elif not case.follows_cycle:
         cycle = (*_CYCLE, "inlet_frame", *(() if motion.table is not None else ("gamma", "profile")))
         why = f"a run with fidelity {case.fidelity} sees the bed's mean velocity, not the cycle (vibrational_dispersion would)"
         yield from _typed(motion, "motion", cycle, why)
@@ -69,7 +70,7 @@ def _of_time(case: Case) -> Idle:
         yield from _typed(case.output, "output", ["every", "checkpoint"], why)
     elif case.fidelity == "resolved":
         yield from _typed(case.time, "time", ["step"], "a resolved run has steps_per_cycle")
-    if case.fidelity != "resolved" and not case.transport.vibrational_dispersion:
+    if not case.follows_cycle:
         yield from _typed(
             case.time, "time", ["steps_per_cycle"], "only a run that follows the cycle has them"
         )

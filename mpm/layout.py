@@ -190,6 +190,11 @@ class Inlet(_Port):
         """Whether this port is there for a precursor (its mass fraction may be zero) or only for carrier gas."""
         return bool(self.mass_fractions)
 
+    @property
+    def stays_open(self) -> bool:
+        """Whether the last window has no end: what the steady state sees of the windows."""
+        return math.isinf(self.windows[-1][1])
+
 
 class Outlet(_Port):
     """A stretch of wall at ambient pressure."""

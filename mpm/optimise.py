@@ -121,9 +121,7 @@ def checked_doses(case: Case, target: float, weight: float, velocities: bool, li
 def refuse_inlet(case: Case, inlet: Inlet) -> None:
     """Raise InputError for a dosing inlet whose dose the search could not choose or whose effect it could not see."""
     key = f"optimise: geometry.inlet.{inlet.name}"
-    fed = [
-        name for name, y in inlet.mass_fractions.items() if y > 0.0 and case.mechanism.half_reactions(name)
-    ]
+    fed = case.mechanism.precursors(inlet.mass_fractions)
     if inlet.velocity == 0.0:
         raise InputError(
             f"{key}.velocity: found 0 m/s, a port that doses nothing; accepted: a velocity above 0 m/s"
@@ -132,7 +130,7 @@ def refuse_inlet(case: Case, inlet: Inlet) -> None:
         raise InputError(
             f"{key}.mass_fractions: found the precursors {', '.join(fed)}; accepted: one in each inlet"
         )
-    if math.isfinite(inlet.windows[-1][1]):
+    if not inlet.stays_open:
         raise InputError(
             f"{key}: found doses that end at {inlet.windows[-1][1]:g} s; accepted: an inlet that doses without end, as in a steady state"
         )

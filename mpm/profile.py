@@ -26,6 +26,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from mpm.files import read_text
 from mpm.units import Angle, Frequency, NonNegative, reject
 
+PRESETS = ("thesis", "phases")
+"""What `motion.profile` may be besides the path of a file."""
 REQUIRED = ("phase_deg", "u_x_m/s")
 COLUMNS = (*REQUIRED, "u_y_m/s", "contact")
 TURN = 2.0 * math.pi
@@ -78,9 +80,9 @@ def read_profile(path: Path, key: str = "profile") -> BedProfile:
     except FileNotFoundError:
         raise wrong(
             "no such file",
-            "thesis, phases, or a CSV file from mpm dem",
+            f"{', '.join(PRESETS)}, or a CSV file from mpm dem",
             given=path.name,
-            known=["thesis", "phases"],
+            known=PRESETS,
         ) from None
     except (OSError, ValueError) as error:
         raise wrong(f"unreadable ({error})", "a CSV file from mpm dem") from None

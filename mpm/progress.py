@@ -69,7 +69,7 @@ class Progress:
     def warn(self, text: str) -> None:
         """A line that stays, for the person who watches."""
         if self.shown:
-            self.console.print(f"warning: {text}", markup=False, highlight=False, soft_wrap=True)
+            self.console.print(f"warning: {text}", soft_wrap=True)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

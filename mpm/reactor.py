@@ -24,6 +24,7 @@ from mpm.dispersion import vibrational_dispersion
 from mpm.errors import ConvergenceError, InputError, Interrupted, StorageError, printable, storage_error
 from mpm.flownumbers import flux_profiles
 from mpm.geometry import Grid
+from mpm.history import Row, columns_of
 from mpm.motion import BedMotion, step_motion
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, largest, on_root, total
@@ -176,11 +177,11 @@ class Reactor:
             checkpoint.restore(self, *state)
             self.kept, rows = self.time, state[1]["rows"]
 
-            def cut_back() -> dict[str, Floats]:
+            def cut_back() -> list[Row]:
                 directory.cut_back(rows, self.time)
-                return directory.history()
+                return list(directory.table.rows)
 
-            self.rows = checkpoint.rows(on_root(self.comm, cut_back))
+            self.rows = on_root(self.comm, cut_back)
             self.numbers = self.rows[-1] if self.rows else {}
         elif resume:
             on_root(self.comm, lambda: directory.cut_back(0, 0.0))
@@ -358,8 +359,7 @@ class Reactor:
 
     def history(self) -> dict[str, Floats]:
         """Columns of the history; NaN where a row lacks one."""
-        names = dict.fromkeys(name for row in self.rows for name in row)
-        return {name: np.array([row.get(name, np.nan) for row in self.rows]) for name in names}
+        return columns_of(self.rows)
 
     def totals(self) -> Totals:
         """What has passed so far, summed over all ranks; collective."""

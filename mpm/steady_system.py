@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from mpm.cellmatrix import CellMatrix
 from mpm.fem import PETSc
 from mpm.parallel import is_root, total
-from mpm.transport import stays_open
 
 if TYPE_CHECKING:
     from mpm.fluxes import PortFlux
@@ -79,7 +78,7 @@ class SteadySystem:
         ends = local - self.held if is_root(comm) else 0
         self.mean_number = int(total(comm, [ends])[0]) + self.b * np.arange(len(outlets))
         first = int(comm.scan(local)) - local
-        self.local, self.first = local, first
+        self.local = local
         sizes = comm.allgather((first, strip.owned))
         # global number of the first gas unknown of any cell, from its PETSc cell number
         starts = np.cumsum([0] + [owned for _, owned in sizes])[:-1]
@@ -257,4 +256,4 @@ class SteadySystem:
 
 def doses(transport: Transport) -> Floats:
     """1 for every inlet that doses in the steady state, else 0, (inlets,)."""
-    return np.array([stays_open(inlet) for inlet in transport.case.geometry.inlets])
+    return np.array([float(inlet.stays_open) for inlet in transport.case.geometry.inlets])

@@ -1,6 +1,6 @@
 """summary.json and the rows of history.csv: the numbers people quote, SI units.
 
-They are defined in `mpm.diagnostics`, `mpm.balances` and `mpm.fronts`.
+They are defined in `mpm.diagnostics`, `mpm.balances`, `mpm.flownumbers` and `mpm.fronts`.
 """
 
 from __future__ import annotations

@@ -381,8 +381,3 @@ def open_share(inlet: Inlet, t0: float, dt: float) -> float:
     """Share of the step of `dt` from `t0` [s] during which the inlet doses."""
     dosing = sum(max(min(stop, t0 + dt) - max(start, t0), 0.0) for start, stop in inlet.windows)
     return min(dosing / dt, 1.0)
-
-
-def stays_open(inlet: Inlet) -> float:
-    """1 when the inlet doses for ever (its last window has no end), else 0."""
-    return float(inlet.windows[-1][1] == np.inf)

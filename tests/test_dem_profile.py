@@ -14,7 +14,7 @@ from mpm.dem.base import FLAT, frit_monolayer, loose_filling, sawtooth_baffle, t
 from mpm.dem.case import load_case
 from mpm.dem.gas import GasDrag, slab_solids
 from mpm.dem.powder import POWDERS
-from mpm.dem.profile import HEADER, Profile, conditions, piecewise_fit, scaled_to_mean
+from mpm.dem.profile import Profile, conditions, piecewise_fit, scaled_to_mean
 from mpm.dem.relations import minimum_fluidisation_velocity
 from mpm.dem.waveform import Sawtooth, sine
 from mpm.errors import InputError
@@ -63,7 +63,7 @@ def test_reactor_reads_the_profile(tmp_path):
     curve = ideal_curve(97.85, 18.71, 0.01435)
     path = tmp_path / "profile.csv"
     curve.write(path, ["a remark", "SCALED: another"])
-    assert path.read_text().splitlines()[0] == HEADER
+    assert path.read_text().splitlines()[0] == "phase_deg,u_x_m/s,u_y_m/s,contact"
     assert read_profile(path).mean == pytest.approx(curve.mean, rel=1e-6)
     rows = [r for r in csv.reader(path.open()) if not r[0].startswith("#")]
     assert len(rows) == N + 1

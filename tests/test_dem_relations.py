@@ -13,8 +13,9 @@ from mpm.dem.contact import Contact
 from mpm.dem.powder import POWDERS
 from mpm.dem.simulate import build
 from mpm.errors import InputError
+from mpm.gases import ideal_gas_density
 
-AIR = rel.ideal_gas_density(29e-3, 293.15, 101325.0)
+AIR = ideal_gas_density(101325.0, 29e-3, 293.15)
 MU = 18e-6
 
 

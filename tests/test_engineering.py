@@ -158,7 +158,7 @@ def test_expected_steps(case: Case) -> None:
         ({"motion.bed_velocity": "3 cm/s"}, "above perfect flight"),
         ({"geometry.inlet.tma.velocity": "10 cm/s"}, "minimum fluidisation"),
         ({"geometry.inlet.tma.mass_fractions.TMA": 0.021}, "not dilute"),
-        ({"time.steps_per_cycle": 4}, "CFL above 1"),
+        ({"fidelity": "resolved", "time.steps_per_cycle": 4}, "CFL above 1"),
         (
             {"time.step": "0.1 s"},
             "columns in a step, which leaves stripes of single columns in the coverage: lower time.step to 26.2 ms",
@@ -170,6 +170,15 @@ def test_expected_steps(case: Case) -> None:
 def test_what_is_questionable_is_said(case: Case, change: dict[str, object], text: str) -> None:
     (warning,) = check_case(case.with_(change))["warnings"]
     assert text in warning
+
+
+def test_no_advice_to_change_a_key_that_nothing_reads(case: Case) -> None:
+    """Fails when a run whose flow is the mean of the cycle is told to take more steps per cycle."""
+    averaged = case.with_({"time.steps_per_cycle": 4})
+    assert not any("CFL" in warning for warning in check_case(averaged)["warnings"])
+    followed = check_case(averaged.with_({"transport.vibrational_dispersion": True}))
+    assert any("CFL above 1" in warning for warning in followed["warnings"])
+    assert not any("steps_per_cycle" in sentence for sentence in followed["without_effect"])
 
 
 def test_the_step_that_the_warning_advises(case: Case) -> None:

@@ -41,6 +41,8 @@ def test_defaults_are_not_spoken_of() -> None:
         ({"fidelity": "resolved", "motion": {"gamma": 0.4, "startup": "impulsive"}, "time": {"step": "1 ms"}}, {"time.step"}),
         ({"fidelity": "resolved", "motion": {"liftoff_phase": "9 deg"}}, {"motion.liftoff_phase"}),
         ({"fidelity": "resolved", "motion": {"gamma": 0.0, "angle": "30 deg"}}, {"motion.angle"}),
+        ({"fidelity": "resolved", "motion": {"gamma": 0.0, "frequency": "20 Hz"}}, set()),
+        ({"motion": {"gamma": 0.0, "frequency": "20 Hz"}}, {"motion.frequency"}),
         ({"material": {"glass_beads": {"heat_capacity": "1 J/kg/K", "conductivity": "1 W/m/K", "density": "2 g/cm^3"}}},
          {"material.glass_beads.heat_capacity", "material.glass_beads.conductivity"}),
         ({"material": {"frit_felt": {"porosity": 0.6}}}, {"material.frit_felt"}),

@@ -285,6 +285,17 @@ def test_equations_that_cannot_be_compiled_are_said_in_one_line(
         Reactor(CASE, MPI.COMM_SELF).run()
 
 
+def test_a_compiler_that_does_not_end_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when a run that has waited in vain for another that compiles ends in a traceback."""
+    monkeypatch.setattr("mpm.fem.cache_directory", lambda: tmp_path)
+    monkeypatch.setattr("mpm.fem.COMPILING", 0.1)
+    with (
+        lock(tmp_path / "lock"),
+        pytest.raises(InputError, match=r"another process has been compiling for 0\.1 s"),
+    ):
+        Reactor(CASE, MPI.COMM_SELF).run()
+
+
 def test_one_process_at_a_time(tmp_path: Path) -> None:
     """Fails when a lock lets two in, outlives its file, or is taken on a file that its last owner has removed."""
     path = tmp_path / "lock"

@@ -17,6 +17,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from mpm.caseio import read_toml
 from mpm.errors import InputError
+from mpm.gases import ideal_gas_density
 from mpm.units import (
     Density,
     Dimension,
@@ -34,7 +35,7 @@ from mpm.units import (
 
 from .powder import POWDERS, SMALLEST, Powder
 from .reading import one_line, set_dotted
-from .relations import ideal_gas_density, mean_free_path
+from .relations import mean_free_path
 from .waveform import Waveform
 from .waveform_input import MeasuredInput, Section, WaveformInput
 
@@ -135,7 +136,7 @@ class GasInput(Section):
 
     @property
     def density(self) -> float:
-        return ideal_gas_density(self.molar_mass, self.temperature, self.pressure)
+        return ideal_gas_density(self.pressure, self.molar_mass, self.temperature)
 
     @property
     def mean_free_path(self) -> float:

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from mpm.files import write_atomically
-from mpm.profile import Conditions
+from mpm.profile import COLUMNS, Conditions
 
-from .relations import GRAVITY
+from ..constants import GRAVITY
 from .waveform import Waveform, peak_displacement
 
-HEADER = "phase_deg,u_x_m/s,u_y_m/s,contact"
 SINE = 0.02
 """Share of its amplitude by which a displacement may differ from a sine: what a reactor that vibrates in one would not notice."""
 
@@ -37,7 +36,7 @@ class Profile:
     def write(self, path: Path, remarks: Sequence[str]) -> None:
         """Write the table; the remarks, of which one tells the `conditions`, follow the header as comment lines."""
         rows = np.column_stack([self.phase, *self.velocity, self.contact])
-        lines = [HEADER, *(f"# {line}" for line in remarks)]
+        lines = [",".join(COLUMNS), *(f"# {line}" for line in remarks)]
         lines += [",".join(f"{value:.9g}" for value in row) for row in rows]
         write_atomically(path, "\n".join(lines) + "\n")
 

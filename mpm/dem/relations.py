@@ -68,11 +68,6 @@ def kozeny_carman_constant(porosity: float, surface_to_volume: float, permeabili
     return porosity**3 / (surface_to_volume**2 * permeability)
 
 
-def ideal_gas_density(molar_mass: float, temperature: float, pressure: float) -> float:
-    """rho = p M/(R T) [kg/m3]; molar mass in kg/mol."""
-    return pressure * molar_mass / (GAS_CONSTANT * temperature)
-
-
 def gidaspow_beta(
     porosity: np.ndarray,
     slip: np.ndarray,

@@ -53,6 +53,12 @@ PATIENCE = 60.0
 LAUNCHER_LINE = re.compile(
     r"=|\[(proxy|mpiexec)|Abort\(|application called MPI_Abort|YOUR APPLICATION|This typically|Please see the FAQ"
 )
+WITHOUT_NUMBERS = (
+    *("sweep", "dem", "cases"),
+    *("cli.py", "launcher.py", "settings.py", "screen.py", "tables.py", "caveats.py", "idle.py"),
+    *("results.py", "plot.py", "maps.py", "labels.py", "optimise.py"),
+)
+"""Parts of the package that change no number of a point: sweeps, particles, the command line, warnings, pictures."""
 NO_ROOM = 74
 """Exit status (EX_IOERR) in the record of a point that met a full disk."""
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -76,14 +82,13 @@ class Task:
 def program() -> str:
     """Version of mpm and a digest of the sources that decide a point's numbers, e.g. "mpm 0.1.0 (3f2a9c01)".
 
-    The digest notices an edited working copy whose version number stayed. Sweep, pictures and command line are left
-    out of it: they change no number.
+    The digest notices an edited working copy whose version number stayed. What changes no number, `WITHOUT_NUMBERS`, is left out of it.
     """
     package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for file in sorted((*package.rglob("*.py"), *package.rglob("*.toml"))):
         where = file.relative_to(package)
-        if where.parts[0] not in ("sweep", "dem", "plot.py", "cli.py", "cases"):
+        if where.parts[0] not in WITHOUT_NUMBERS:
             digest.update(f"{where}\0".encode() + file.read_bytes())
     return f"mpm {metadata.version('mpm')} ({digest.hexdigest()[:8]})"
 
