@@ -201,7 +201,11 @@ def watched_job() -> Any:
         async def start(self) -> None:
             try:
                 await super().start()
-            except (RuntimeError, ValueError) as error:  # ValueError: sbatch printed no number
+            except (
+                RuntimeError,
+                ValueError,
+                OSError,
+            ) as error:  # sbatch printed no number; no room for its script
                 self.refused.append(" ".join(str(error).split()))
                 self.status = Status.running
             else:
