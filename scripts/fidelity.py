@@ -1,9 +1,10 @@
 """Does a cheaper fidelity, or a longer step, give the same coverage? Zone at the thesis mesh, 20 s, three doses.
 
-    mpirun -n 2 python scripts/fidelity.py       # what has not been run yet, then the table in docs/fidelity.md
-    mpirun -n 2 python scripts/fidelity.py --dose 2e-4
+    python scripts/fidelity.py       # what has not been run yet, then the table in docs/fidelity.md
+    python scripts/fidelity.py --dose 2e-4
 
-Each run is kept under results/fidelity and not run again. Runs with the same flow share it, so times are without it.
+Each run is kept under results/fidelity and not run again. Runs with the same flow share it, so times are without it; they are processor
+seconds of the first rank, which other programs on the machine disturb least.
 """
 
 from __future__ import annotations
@@ -54,9 +55,9 @@ def measure(model: str, dose: float, flow: Replay | None) -> Replay:
     else:
         flow = Replay(reactor.strip, flow.fields, flow.rests)
     reactor.flows = flow
-    begun = time.monotonic()
+    begun = time.process_time()
     summary = reactor.run().summary
-    seconds = time.monotonic() - begun
+    seconds = time.process_time() - begun
     coverage = reactor.coverage("bed", SITE)
     if is_root(reactor.comm):
         balance = max(entry["balance_error"] for entry in summary["species"].values())
