@@ -361,7 +361,12 @@ class Case(Frozen):
 
         They enter the strip and every zone at the end that they come from, left or right, and leave at the other.
         """
-        return -1 if self.geometry.moving_layer is not None and self.motion.mean_velocity < 0.0 else 1
+        return -1 if self.conveying_velocity < 0.0 else 1
+
+    @property
+    def conveying_velocity(self) -> float:
+        """Mean velocity of the moving layer [m/s], negative to the left; 0 in a strip without one."""
+        return 0.0 if self.geometry.moving_layer is None else self.motion.mean_velocity
 
     @property
     def follows_cycle(self) -> bool:

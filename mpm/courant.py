@@ -27,7 +27,7 @@ def driving_speed(case: Case) -> float:
     """
     geometry, vibration = case.geometry, Vibration.from_motion(case.motion)
     swing = math.hypot(vibration.ax, vibration.ay) * vibration.omega
-    moved = swing + abs(case.motion.mean_velocity)
+    moved = swing + abs(case.conveying_velocity)
     fastest = max([moved, *(abs(inlet.velocity) + swing for inlet in geometry.inlets)])
     if not geometry.outlets:
         return fastest

@@ -195,7 +195,7 @@ def numerical_diffusion(case: Case, grid: Grid) -> float:
     Pe = v dx tau^2 / D of a column, with the speed v at which gas may pass the columns of the mesh: that of the bed, which takes its gas
     along, and the reactor's peak velocity where every phase is resolved. About Pe^2/12 in fine meshes.
     """
-    vibration, speed = Vibration.from_motion(case.motion), abs(case.motion.mean_velocity)
+    vibration, speed = Vibration.from_motion(case.motion), abs(case.conveying_velocity)
     if case.fidelity == "resolved":
         speed += vibration.ax * vibration.omega
     slowest = min(case.gas.diffusivity.values(), default=0.0)

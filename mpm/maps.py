@@ -118,7 +118,7 @@ def map_figure(
 
 def way(case: Case) -> str:
     """Which way the bed moves, in words; nothing when it does not."""
-    if case.geometry.moving_layer is None or case.motion.mean_velocity == 0.0:
+    if case.conveying_velocity == 0.0:
         return ""
     return f" (the bed moves to the {'right' if case.direction > 0 else 'left'})"
 

@@ -95,7 +95,7 @@ def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
             v = inlet.velocity
             doses.append(Dose(f"{key}.velocity", v, v / VELOCITIES, v * VELOCITIES, "m/s"))
     if not doses:
-        if case.geometry.moving_layer is None or case.motion.mean_velocity == 0.0:
+        if case.conveying_velocity == 0.0:
             found = "a bed that does not move"
         elif not case.mechanism.surface_reactions:
             found = "a mechanism without surface reactions"

@@ -71,7 +71,7 @@ class Schedule:
             phases = n if case.motion.gamma > 0.0 else 1
             return cls(1.0 / case.motion.frequency / n, phases, case.motion.start, case.time.end)
         column = case.geometry.length / case.geometry.columns
-        step = aligned_step(case.time.step, column, abs(case.motion.mean_velocity))
+        step = aligned_step(case.time.step, column, abs(case.conveying_velocity))
         return cls(step, 1, case.motion.start, case.time.end)
 
     @property

@@ -6,7 +6,7 @@ import pytest
 
 from mpm.schedule import RESTING, Schedule, aligned_step
 
-from .cases import SHORT, TINY, zone
+from .cases import SHORT, TINY, strip_case, zone
 
 SCHEDULES = {
     "whole steps": Schedule(dt=0.01, phases=1, start=0.05, end=1.0),
@@ -62,3 +62,15 @@ def test_steps_fit_the_shifts_of_the_bed() -> None:
     assert aligned_step(0.014, 5e-3, 0.013) == pytest.approx(shift / 28)
     assert aligned_step(1.0, 5e-3, 0.013) == pytest.approx(2 * shift)
     assert aligned_step(0.014, 5e-3, 0.0) == 0.014
+
+
+def test_a_strip_without_a_bed_does_not_align_its_steps() -> None:
+    """Fails when `motion.bed_velocity`, which `mpm check` calls idle where no layer moves, shortens the steps there."""
+    layers = [{"name": "gas", "height": "6 mm", "cells": 6}]
+    steps = {
+        speed: Schedule.from_case(
+            strip_case(layers, columns=30, length=0.06, motion={"gamma": 0.0, "bed_velocity": speed})
+        )
+        for speed in ("0 m/s", "1.3 cm/s")
+    }
+    assert steps["0 m/s"] == steps["1.3 cm/s"]
