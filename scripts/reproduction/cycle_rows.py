@@ -122,8 +122,8 @@ def overshoot(lab: Lab) -> Finding:
         f"{w}: {n['zone1']:.3f} in zone 1, {n['zone2']:.3f} in zone 2" for w, n in numbers.items()
     )
     why = (
-        "The overshoot comes from the fresh bed and frit above the port at the start; it needs more precursor "
-        "than the passing sites consume."
+        "An overshoot would come from the fresh bed and frit above the port at the start. Where gas moves with the powder at the face of "
+        "the bed none is left; with the shear of earlier revisions it was 8 % at 4.0 mm."
     )
     return Finding(checks.verdict, measured, numbers, why)
 
@@ -203,6 +203,9 @@ def cvd_rates(lab: Lab) -> Finding:
         checks.add(f"rich at least 10 times above, ports {width}", ratio >= 10.0)
         checks.add(f"start-up spike, ports {width}", peak["stoichiometric"] > 1.1)
         checks.add(f"removed by the delay, ports {width}", peak["delayed"] <= 1.1)
+    narrow = numbers[WIDTHS[-1]]
+    peaks = {name: narrow["final"][name] * narrow["peak over final"][name] for name in narrow["final"]}
+    reduced = peaks["delayed"] / peaks["stoichiometric"]
     measured = "; ".join(
         f"{w}: ratio {n['ratio']:.0f}, peak over final {n['peak over final']['stoichiometric']:.2f} without, "
         f"{n['peak over final']['delayed']:.2f} with delay"
@@ -211,7 +214,8 @@ def cvd_rates(lab: Lab) -> Finding:
     why = (
         "With ports of 4.0 mm both doses exceed saturation; what is left over of both precursors makes the rate climb to its "
         "final value without a maximum worth the name. With ports of 2.2 mm, where the doses just saturate, water that the "
-        "bed cannot consume at first gives a broad maximum, and the delay removes it."
+        "bed cannot consume at first gives a broad maximum. A delay of 15 s lowers both maximum and final value at 60 s, the first "
+        f"to {reduced:.2f} of that without, and leaves a maximum."
     )
     return Finding(checks.verdict, measured, numbers, why)
 

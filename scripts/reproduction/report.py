@@ -47,7 +47,7 @@ with that in mind:
 * **R13** was a fit of three segments, of which no condition held; times at 10 and 90 % of the rise replaced it.
 * **R6** had three definitions of the front's distance (in part with the first, not reproduced with the others), **R4** had its checks
   regrouped after "not reproduced" on a coarse mesh, and **R3** was given a strip with closed ends beside the periodic one.
-* The burst of CVD that a delay removes (**R20**) exists at a port of 2.2 mm only; at 4.0 mm the rate climbs monotonically.
+* The burst of CVD that a delay lowers (**R20**) exists at a port of 2.2 mm only; at 4.0 mm the rate climbs monotonically.
 
 All rows were measured with one revision of the program, on 2026-11-26, after the shear at the face of the moving bed had been corrected
 ([CHANGELOG](../CHANGELOG.md)): gas at its surface now moves with the powder. Compared with the measurement before it, of 2026-11-23, that
