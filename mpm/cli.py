@@ -6,6 +6,7 @@ Input is checked by every rank before MPI is loaded, so that bad input ends all 
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -249,6 +250,7 @@ def dem(context: typer.Context) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; no MpmError leaves a traceback."""
     spell_out()
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a read-only home is said by us, where it matters
     with _terminable():
         try:
             result = typer.main.get_command(app).main(
