@@ -250,7 +250,9 @@ def dem(context: typer.Context) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; no MpmError leaves a traceback."""
     spell_out()
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a read-only home is said by us, where it matters
+    logging.getLogger("matplotlib").setLevel(
+        logging.ERROR
+    )  # a read-only home is said by us, where it matters
     with _terminable():
         try:
             result = typer.main.get_command(app).main(
