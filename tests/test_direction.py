@@ -11,6 +11,7 @@ from mpm.bed import Bed
 from mpm.case import Case
 from mpm.geometry import Grid
 from mpm.maps import way
+from mpm.parallel import on_root
 from mpm.plot import exits
 from mpm.reactor import Reactor
 from mpm.results import load_run
@@ -24,9 +25,10 @@ TMA = "geometry.inlet.tma.mass_fractions.TMA"
 
 
 def conveyed(case: Case, speed: float, folder: Path) -> Case:
-    """`case` with a bed that a profile moves at a constant `speed` [m/s]."""
+    """`case` with a bed that a profile moves at a constant `speed` [m/s]; collective, rank 0 writes the file."""
     path = folder / f"profile_{speed:g}.csv"
-    path.write_text("phase_deg,u_x_m/s\n" + "".join(f"{phase},{speed}\n" for phase in (0, 90, 180, 270)))
+    rows = "".join(f"{phase},{speed}\n" for phase in (0, 90, 180, 270))
+    on_root(MPI.COMM_WORLD, lambda: path.write_text(f"phase_deg,u_x_m/s\n{rows}"))
     return case.with_({"motion.profile": str(path)})
 
 
