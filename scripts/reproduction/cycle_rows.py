@@ -123,7 +123,7 @@ def overshoot(lab: Lab) -> Finding:
     )
     why = (
         "An overshoot would come from the fresh bed and frit above the port at the start. Where gas moves with the powder at the face of "
-        "the bed none is left; with the shear of earlier revisions it was 8 % at 4.0 mm."
+        "the bed none is left; with the shear of earlier revisions, on the thesis' mesh, it was 8 % at 4.0 mm."
     )
     return Finding(checks.verdict, measured, numbers, why)
 
