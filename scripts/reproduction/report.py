@@ -51,9 +51,9 @@ with that in mind:
 
 All rows were measured with one revision of the program, on 2026-11-26, after the shear at the face of the moving bed had been corrected
 ([CHANGELOG](../CHANGELOG.md)): gas at its surface now moves with the powder. Compared with the measurement before it, of 2026-11-23, that
-turned four verdicts. R14 holds now. In R17 the overshoot in zone 1 at 4.0 mm is gone, but that row was on
-the thesis' mesh before and is on the medium one now, so the mesh may have a part in it. In R20 the delay leaves a burst at 2.2 mm. In R8
-the order by Gamma holds with inlets at rest in the lab. A stored run is named by its case, not by the program: delete `results/reproduce` to
+turned four verdicts. R14 holds now. In R17 the overshoot in zone 1 at 4.0 mm is gone, but that row was on the thesis' mesh before and is
+on the medium one now, so the mesh may have a part in it. In R20 the delay leaves a burst at 2.2 mm. In R8 the order by Gamma holds with
+inlets at rest in the lab. A stored run is named by its case, not by the program: delete `results/reproduce` to
 measure with another revision.
 Explanations in the paragraphs for R14, R16 to R18 and R21 are interpretations that have not been tested on their own.
 
