@@ -13,6 +13,7 @@ from rich.text import Text
 from mpm.case import Case
 from mpm.errors import printable
 from mpm.geometry import Grid
+from mpm.quantities import unit_of
 from mpm.screen import Listing
 
 
@@ -189,8 +190,6 @@ _SUMMARY = {
 
 def print_summary(summary: dict[str, Any], console: Console) -> None:
     """Print the figures of a summary that one looks at first, and the worst balance."""
-    from mpm.sweep.table import unit_of
-
     table, steady = Listing("quantity", "of", "value", "unit"), summary.get("fidelity") == "steady"
     for section, title in _SUMMARY.items():
         for name, value in _numbers(summary.get(section, {})):

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from mpm import cli
+from mpm.cli import program
 from mpm.errors import ConvergenceError, InputError, Interrupted, MpmError
 
 MPIRUN = Path(sys.executable).with_name("mpirun")
 
 PROGRAM = """
 import sys
-from mpm import cli
+from mpm.cli import base, program
 from mpm.errors import ConvergenceError
 
-cli._PATIENCE = 1.0
+program._PATIENCE = 1.0
 
-@cli.app.command()
+@base.app.command()
 def fail(who: str) -> None:
     from mpi4py import MPI
 
@@ -33,7 +33,7 @@ def fail(who: str) -> None:
         raise ZeroDivisionError("a defect")
     MPI.COMM_WORLD.Barrier()
 
-sys.exit(cli.main(sys.argv[1:]))
+sys.exit(program.main(sys.argv[1:]))
 """
 
 
@@ -54,7 +54,7 @@ def test_each_error_has_its_status_and_one_line(
         raise error
 
     monkeypatch.setattr("mpm.case.case_schema", schema)
-    assert cli.main(["schema"]) == status
+    assert program.main(["schema"]) == status
     out, err = capsys.readouterr()
     assert out == ""
     assert len(err.strip().splitlines()) == 1
@@ -69,14 +69,14 @@ def test_a_defect_shows_where_it_is(
 
     monkeypatch.setattr("mpm.case.case_schema", schema)
     with pytest.raises(SystemExit, match="1"):
-        cli.main(["schema"])
+        program.main(["schema"])
     assert "Traceback" in capsys.readouterr().err
 
 
 def test_sigterm_ends_like_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
     before = signal.getsignal(signal.SIGTERM)
     monkeypatch.setattr("mpm.case.case_schema", lambda: os.kill(os.getpid(), signal.SIGTERM))
-    assert cli.main(["schema"]) == 130
+    assert program.main(["schema"]) == 130
     assert signal.getsignal(signal.SIGTERM) is before
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from mpm.case import load_case
 from mpm.check import check_case
-from mpm.cli import parse_settings
 from mpm.geometry import Grid
 from mpm.output import RunDirectory
+from mpm.settings import parse_settings
 
 ROOT = Path(__file__).parent.parent
 

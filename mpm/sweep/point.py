@@ -55,7 +55,8 @@ LAUNCHER_LINE = re.compile(
 )
 WITHOUT_NUMBERS = (
     *("sweep", "dem", "cases"),
-    *("cli.py", "launcher.py", "settings.py", "screen.py", "tables.py", "caveats.py", "idle.py"),
+    *("cli", "launcher.py", "settings.py", "screen.py", "tables.py", "caveats.py", "idle.py"),
+    *("quantities.py", "keys.py", "page"),
     *("results.py", "plot.py", "maps.py", "labels.py", "optimise.py"),
 )
 """Parts of the package that change no number of a point: sweeps, particles, the command line, warnings, pictures."""

@@ -10,12 +10,13 @@ from importlib import metadata
 from typing import Any
 
 from mpm.files import write_atomically
+from mpm.quantities import flatten, unit_of
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.plan import Point
 from mpm.sweep.point import error_of, program, status_of
 from mpm.sweep.quantities import to_number
 from mpm.sweep.sweepfile import DEFAULT_COLUMNS, Sweep
-from mpm.sweep.table import Row, choose, flatten, unit_of, write_csv, write_parquet
+from mpm.sweep.table import Row, choose, write_csv, write_parquet
 
 PACKAGES = (
     "mpm",

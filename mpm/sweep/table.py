@@ -10,7 +10,6 @@ import csv
 import fnmatch
 import io
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -24,43 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-UNITS: tuple[tuple[str, str], ...] = (
-    (r"flow\.(inflow|outflow|outlets\..*)", "m^2/s"),
-    (r"flow\.bed_superficial_velocity\.\d", "m/s"),
-    (r"flow\.(\w+_pressure_drop|pressure_drop\..*)", "Pa"),
-    (r"cvd\.rate_(mean|max)", "mol/m^3/s"),
-    (r"(simulated|wall)_seconds", "s"),
-    (r"front\..*", "m"),
-    (r"film\..*\.per_area", "mol/m^2"),
-    (r"film\..*\.thickness", "m"),
-)
-"""Units of summary.json by dotted name; everything else there is a pure number or a count."""
-AMOUNT = re.compile(
-    r"species\.[^.]+\.(fed|left|reacted|stored|produced)|film\..*\.amount|cvd\.total(_in_zone\..*)?"
-)
-"""Amounts per metre of depth; of a steady state per second."""
 Row = dict[str, float | str | None]
-
-
-def unit_of(column: str, steady: bool) -> str:
-    """SI unit of a number of summary.json; "1" for pure numbers and counts."""
-    if AMOUNT.fullmatch(column):
-        return "mol/m/s" if steady else "mol/m"
-    return next((unit for pattern, unit in UNITS if re.fullmatch(pattern, column)), "1")
-
-
-def flatten(summary: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
-    """The numbers of a summary by dotted name; entries of lists by their index (`...exit_profile.0`)."""
-    numbers: dict[str, float] = {}
-    for key, value in summary.items():
-        name = f"{prefix}{key}"
-        if isinstance(value, Mapping):
-            numbers |= flatten(value, f"{name}.")
-        elif isinstance(value, list):
-            numbers |= flatten({str(index): item for index, item in enumerate(value)}, f"{name}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-            numbers[name] = value
-    return numbers
 
 
 def choose(patterns: Sequence[str], available: Iterable[str]) -> list[str]:

@@ -10,13 +10,13 @@ import pytest
 
 import mpm
 from mpm.errors import InputError
+from mpm.quantities import flatten, unit_of
 from mpm.sweep import driver
 from mpm.sweep.cluster import Pool
 from mpm.sweep.layout import Layout
 from mpm.sweep.plan import plan
 from mpm.sweep.results import Results
 from mpm.sweep.sweepfile import read_sweep
-from mpm.sweep.table import flatten, unit_of
 
 SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
 

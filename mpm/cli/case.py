@@ -1,0 +1,73 @@
+"""Verbs about a case before it runs: check, mesh, schema."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mpm.cli.base import CaseArgument, SetOption, app
+from mpm.launcher import rank
+from mpm.screen import screen
+from mpm.settings import parse_settings
+
+
+@app.command()
+def mesh(
+    case: CaseArgument,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.msh", help="default: CASE.msh")
+    ] = None,
+    settings: SetOption = None,
+) -> None:
+    """Write the gmsh mesh of a case or of a shared geometry, and list its zones, ports and cells."""
+    from mpm.case import load_case
+
+    loaded = load_case(case, parse_settings(settings))
+    if rank() != 0:
+        return
+    from mpm.mesh import write_msh
+    from mpm.tables import print_mesh
+
+    path = output or Path(f"{Path(case).stem}.msh")
+    write_msh(loaded, path)
+    print_mesh(loaded, screen())
+    print(f"Mesh: {path}")
+
+
+@app.command()
+def check(
+    case: CaseArgument,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="one JSON object with SI numbers and the resolved case")
+    ] = False,
+    settings: SetOption = None,
+) -> None:
+    """Validate a case and print what an engineer asks first."""
+    from mpm.case import load_case
+    from mpm.check import check_case
+
+    loaded = load_case(case, parse_settings(settings))
+    report = check_case(loaded)
+    if rank() != 0:
+        return
+    if as_json:
+        import json
+
+        print(json.dumps({**report, "case": loaded.to_dict()}, indent=2, allow_nan=False))
+        return
+    from mpm.tables import print_report
+
+    print_report(loaded, report, screen())
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of case files, for editors."""
+    import json
+
+    from mpm.case import case_schema
+
+    if rank() == 0:
+        print(json.dumps(case_schema(), indent=2))

@@ -1,0 +1,105 @@
+"""The command line, `mpm` or `python -m mpm`, serially or under mpirun.
+
+Exit status: 0 done, 2 bad input, 3 numerical failure or a full disk, 130 interrupted; 1 for a defect of mpm, with a traceback.
+Input is checked by every rank before MPI is loaded, so that bad input ends all of them alike; only one speaks.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, NoReturn
+
+import typer
+
+from mpm.cli.base import app
+from mpm.errors import InputError, Interrupted, MpmError, printable, storage_error
+from mpm.launcher import rank
+from mpm.screen import spell_out
+
+_PATIENCE = 30.0
+"""Seconds that a failing rank waits for the others to fail as well before it ends the whole job."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit status; no MpmError leaves a traceback."""
+    spell_out()
+    logging.getLogger("matplotlib").setLevel(
+        logging.ERROR
+    )  # a read-only home is said by us, where it matters
+    with _terminable():
+        try:
+            result = typer.main.get_command(app).main(
+                list(sys.argv[1:] if arguments is None else arguments), prog_name="mpm", standalone_mode=False
+            )
+            if result == Interrupted.exit_status:  # typer makes this of a KeyboardInterrupt
+                return _end(Interrupted.exit_status, "interrupted")
+            return result if isinstance(result, int) else 0
+        except MpmError as error:
+            return _end(error.exit_status, str(error))
+        except (KeyboardInterrupt, typer.Abort):
+            return _end(Interrupted.exit_status, "interrupted")
+        except _USAGE_ERROR as error:
+            return _end(
+                InputError.exit_status, f"mpm: {error.format_message()} (mpm --help lists what there is)"
+            )
+        except BrokenPipeError:  # the reader of our output has gone; let nothing more reach the pipe
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        except Exception as error:
+            said = storage_error(error) if isinstance(error, OSError) else None
+            if said is None:
+                _crash()
+            return _end(said.exit_status, str(said))
+
+
+_USAGE_ERROR: Any = typer.BadParameter.__base__
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """Let SIGTERM end the program in the same orderly way as Ctrl-C."""
+
+    def interrupt(number: int, frame: FrameType | None) -> NoReturn:
+        raise Interrupted("interrupted")
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _end(status: int, line: str) -> int:
+    """Say `line` once, wait for the other ranks to fail too, and return the status."""
+    if rank() == 0:
+        print(printable(line), file=sys.stderr, flush=True)
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is None or not mpi.Is_initialized() or mpi.Is_finalized() or mpi.COMM_WORLD.size == 1:
+        return status
+    arrived = mpi.COMM_WORLD.Ibarrier()
+    deadline = time.monotonic() + _PATIENCE
+    while not arrived.Test():
+        if time.monotonic() > deadline:  # the others are in a call that this rank will never join
+            if rank() != 0:
+                print(f"[rank {rank()}] {line}", file=sys.stderr, flush=True)
+            mpi.COMM_WORLD.Abort(status)
+        time.sleep(0.01)
+    return status
+
+
+def _crash() -> NoReturn:
+    """A defect: show where, and take the other ranks down instead of leaving them in a call."""
+    traceback.print_exc()
+    mpi = sys.modules.get("mpi4py.MPI")
+    if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized() and mpi.COMM_WORLD.size > 1:
+        sys.stderr.flush()
+        mpi.COMM_WORLD.Abort(1)
+    raise SystemExit(1)

@@ -1,0 +1,1 @@
+"""The report page: one self-contained HTML file for a run, for several runs side by side, and for a sweep."""
