@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from mpm.errors import MpmError as MpmError
     from mpm.geometry import Grid as Grid
     from mpm.reactor import Reactor as Reactor
+    from mpm.results import load_run as load_run
+    from mpm.sweep import load_sweep as load_sweep
 
 _HOME = {
     "Case": "mpm.case",
@@ -30,6 +32,7 @@ _HOME = {
     "MpmError": "mpm.errors",
     "Grid": "mpm.geometry",
     "Reactor": "mpm.reactor",
+    "load_run": "mpm.results",
     "load_sweep": "mpm.sweep",
 }
 __all__ = list(_HOME)

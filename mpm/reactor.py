@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from mpm import checkpoint, fem  # fem first: it loads the finite-element stack
 from mpm.balances import LIMIT, require_balance, worst_balance
 from mpm.bed import Bed
-from mpm.check import check_case
+from mpm.checks import check_case
 from mpm.diagnostics import State, Totals, total_concentration
 from mpm.dispersion import vibrational_dispersion
 from mpm.errors import ConvergenceError, InputError, Interrupted, StorageError, printable, storage_error

@@ -29,7 +29,7 @@ from rich.console import Console
 
 from mpm.case import load_case
 from mpm.caseio import built_in_files
-from mpm.check import check_case
+from mpm.checks import check_case
 from mpm.dem.case import load_case as load_powder
 from mpm.errors import InputError
 from mpm.sweep.plan import combinations, plan

@@ -388,7 +388,7 @@ def test_a_case_is_frozen(case: Case) -> None:
 def test_reading_a_case_loads_no_solver() -> None:
     """Fails when mpm, the case, the grid or the command line import MPI, PETSc, dolfinx, gmsh or LAMMPS."""
     code = (
-        "import sys, mpm, mpm.case, mpm.geometry, mpm.cli, mpm.check\n"
+        "import sys, mpm, mpm.case, mpm.geometry, mpm.cli, mpm.checks\n"
         "mpm.load_case('single_zone')\n"
         "heavy = {'dolfinx', 'dolfinx_solver', 'mpi4py', 'petsc4py', 'gmsh', 'pyvista', 'lammps'}\n"
         "print(sorted(heavy & set(sys.modules)))"

@@ -12,7 +12,7 @@ from mpm.case import Case
 from mpm.geometry import Grid
 from mpm.maps import way
 from mpm.parallel import on_root
-from mpm.plot import exits
+from mpm.pictures import exits
 from mpm.reactor import Reactor
 from mpm.results import load_run
 from mpm.schedule import Schedule

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mpm.case import load_case
-from mpm.check import check_case
+from mpm.checks import check_case
 from mpm.geometry import Grid
 from mpm.output import RunDirectory
 from mpm.settings import parse_settings

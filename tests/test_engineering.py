@@ -8,7 +8,7 @@ import pytest
 
 from mpm import engineering as eng
 from mpm.case import Case, load_case
-from mpm.check import check_case
+from mpm.checks import check_case
 from mpm.cli import main
 from mpm.geometry import Grid
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from mpm.case import load_case
-from mpm.check import check_case
+from mpm.checks import check_case
 from mpm.dem.case import load_case as load_powder
 from mpm.dem.idle import idle_keys as idle_in_powder
 from mpm.idle import idle_keys

@@ -18,7 +18,7 @@ from mpm.files import file_name
 from mpm.geometry import Grid
 from mpm.maps import WIDTH, coverage_figure, cvd_figure, formula, species_figure, spread
 from mpm.output import RunDirectory
-from mpm.plot import Fields, exit_profile_figure, figures, history_figure, outlets_figure, plot_run
+from mpm.pictures import Fields, exit_profile_figure, figures, history_figure, outlets_figure, plot_run
 from mpm.results import Run, dosing_inlets, fed_species, load_run, sites_made_by
 
 SITE = "OAl(CH3)2"

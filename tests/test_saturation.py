@@ -3,7 +3,7 @@
 import pytest
 
 from mpm.case import Case
-from mpm.check import check_case
+from mpm.checks import check_case
 from mpm.chemistry import Mechanism, Species, SurfaceReaction
 from mpm.saturation import coverage_met, molecules_per_site, saturate, slowest_turnover, uptake
 

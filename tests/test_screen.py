@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from mpm.case import load_case
-from mpm.check import check_case
+from mpm.checks import check_case
 from mpm.cli import main
 from mpm.errors import InputError
 from mpm.screen import Listing, screen

@@ -46,7 +46,7 @@ def check(
 ) -> None:
     """Validate a case and print what an engineer asks first."""
     from mpm.case import load_case
-    from mpm.check import check_case
+    from mpm.checks import check_case
 
     loaded = load_case(case, parse_settings(settings))
     report = check_case(loaded)

@@ -17,7 +17,7 @@ def plot(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the dire
     """Draw the pictures of a run into its plots/."""
     if rank() != 0:
         return
-    from mpm.plot import plot_run
+    from mpm.pictures import plot_run
 
     paths = plot_run(directory, lambda line: print(line, file=sys.stderr))
     for path in paths:

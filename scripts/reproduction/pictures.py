@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mpm.maps import OKABE_ITO, draw_ports, draw_zones, formula
-from mpm.plot import STYLE
+from mpm.pictures import STYLE
 from mpm.results import Run
 from reproduction import cycle_rows, outlet_rows, vibration_rows, zone_rows
 from reproduction.store import Lab

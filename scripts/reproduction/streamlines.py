@@ -19,7 +19,7 @@ from mpm.case import Case
 from mpm.geometry import Grid
 from mpm.maps import draw_ports
 from mpm.motion import BedMotion
-from mpm.plot import STYLE
+from mpm.pictures import STYLE
 from reproduction.flow_rows import GAMMAS, resolved
 from reproduction.flows import BOTTOM, LEFT, RIGHT, TOP, at_rest, cycle, porosities
 from reproduction.pictures import save
