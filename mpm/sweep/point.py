@@ -58,6 +58,7 @@ WITHOUT_NUMBERS = (
     *("cli", "launcher.py", "settings.py", "screen.py", "tables.py", "caveats.py", "idle.py"),
     *("quantities.py", "keys.py", "page"),
     *("results.py", "pictures.py", "maps.py", "labels.py", "optimise.py"),
+    *("compare.py",),
 )
 """Parts of the package that change no number of a point: sweeps, particles, the command line, warnings, pictures."""
 NO_ROOM = 74
