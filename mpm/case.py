@@ -38,24 +38,28 @@ from mpm.materials import Material
 from mpm.mechanism import Chemistry, build_mechanism, check_rates
 from mpm.messages import to_input_error
 from mpm.profile import PRESETS, BedProfile, read_profile
+from mpm.schema import finished
 from mpm.units import (
+    DIFFUSIVITY,
     Angle,
-    Density,
+    BedSpeed,
     Diffusivity,
     Duration,
     Frequency,
+    GasDensity,
     Instant,
+    Interval,
     MolarMass,
     NonNegative,
     Pressure,
-    Speed,
+    RunTime,
     Temperature,
     Velocity,
     Viscosity,
+    WallTime,
     in_range,
     reject,
     worked_out,
-    write_defaults,
 )
 
 __all__ = [
@@ -79,32 +83,38 @@ __all__ = [
 SAME_FREQUENCY = 0.01
 """Relative difference up to which a profile belongs to a vibration: a DEM's waveform may be fitted to a record of the same machine."""
 
+_ONE_DIFFUSIVITY = {"type": "string", **DIFFUSIVITY.about}
 SpeciesDiffusivity = Annotated[
     dict[str, Diffusivity],
     WithJsonSchema(
         {
-            "description": 'one value for all species, e.g. "2.88e-5 m^2/s", or a table of them (and of a default); of those left '
-            "out the value in N2 at 473 K and 101325 Pa, 2.88e-5 m^2/s, is scaled to the carrier, temperature and pressure",
-            "anyOf": [{"type": "string"}, {"type": "object", "additionalProperties": {"type": "string"}}],
+            "anyOf": [_ONE_DIFFUSIVITY, {"type": "object", "additionalProperties": _ONE_DIFFUSIVITY}],
+            "accepted": f"{DIFFUSIVITY.accepted}, or a table of them by species",
+            "examples": ["2.88e-5 m^2/s"],
         }
     ),
 ]
 
 
 class Gas(Frozen):
-    """The carrier gas, whose density and viscosity are those of the mixture (precursors are dilute).
+    """The carrier gas, whose density and viscosity are those of the mixture (precursors are dilute)."""
 
-    molar_mass, viscosity, density: by default from the carrier's property model (`mpm.gases`) and the ideal gas law;
-    diffusivity: one value per species of the mechanism, in free gas; those left out are scaled (`mpm.diffusion`).
-    """
-
-    carrier: str = "N2"
+    carrier: Annotated[str, Field(json_schema_extra={"presets": [*CARRIERS]})] = "N2"
+    """the gas that all inlets blow: N2, Ar, He, or any other name with its molar_mass and viscosity"""
     temperature: Temperature = 473.0
+    """temperature of gas and solids, everywhere the same"""
     pressure: Pressure = 101325.0
-    molar_mass: MolarMass = worked_out()
-    viscosity: Viscosity = worked_out()
-    density: Density = worked_out()
-    diffusivity: SpeciesDiffusivity = worked_out({})
+    """ambient pressure, at the outlets"""
+    molar_mass: MolarMass = worked_out("that of the carrier")
+    """molar mass of the carrier gas"""
+    viscosity: Viscosity = worked_out("the carrier's at this temperature (Sutherland)")
+    """dynamic viscosity of the gas"""
+    density: GasDensity = worked_out("ideal gas law")
+    """density of the gas"""
+    diffusivity: SpeciesDiffusivity = worked_out(
+        "2.88e-5 m^2/s (N2, 473 K, 101325 Pa), scaled to the carrier, temperature and pressure", {}
+    )
+    """of each species in the free gas: one value for all, e.g. "2.88e-5 m^2/s", or a table of them (and of a default)"""
     _scaled: tuple[str, ...] = PrivateAttr(())
 
     @property
@@ -149,27 +159,33 @@ class Gas(Frozen):
 
 
 class Motion(Frozen):
-    """Vibration of the reactor and conveying of the bed.
-
-    gamma: vertical acceleration over g (0: the bed moves steadily at bed_velocity); angle [rad] of the vibration,
-    measured from the horizontal or from the vertical; bed_velocity [m/s]: cycle mean in the reactor's frame (a profile
-    file brings its own: see `mean_velocity`); profile: thesis (lift-off at liftoff_velocity), phases (liftoff_phase, contact_phase [rad]),
-    or the path of a CSV file from `mpm dem`; inlet_frame: what the inlets are fixed to; start [s] of the vibration; startup: begin in the
-    periodic state (developed) or keep the true transient (impulsive).
-    """
+    """Vibration of the reactor and conveying of the bed."""
 
     gamma: NonNegative = 0.30
+    """largest vertical acceleration of the reactor over g; 0: no vibration, the bed moves steadily at bed_velocity"""
     frequency: Frequency = 16.0
+    """frequency of the vibration"""
     angle: Angle = math.pi / 3.0
+    """direction of the vibration, counted from angle_from; it must have a vertical component"""
     angle_from: Literal["horizontal", "vertical"] = "horizontal"
-    bed_velocity: Speed = 0.013
-    profile: str = "thesis"
+    """what the angle is counted from"""
+    bed_velocity: BedSpeed = 0.013
+    """mean speed at which the bed is conveyed, relative to the reactor, to the right; 0: it stays. A profile file brings its own"""
+    profile: Annotated[str, Field(json_schema_extra={"presets": [*PRESETS]})] = "thesis"
+    """how the bed moves within a cycle: thesis (lift-off at liftoff_velocity), phases (liftoff_phase and contact_phase), or the path
+    of a CSV file from `mpm dem`"""
     liftoff_velocity: Velocity = -0.004
+    """vertical velocity of the reactor at which the bed lifts off (profile thesis)"""
     liftoff_phase: Angle | None = None
+    """phase of the cycle at which the bed lifts off, 0 deg to below 360 deg (profile phases)"""
     contact_phase: Angle | None = None
+    """phase of the cycle at which the bed lands again, 0 deg to below 360 deg (profile phases)"""
     inlet_frame: Literal["reactor", "lab"] = "reactor"
+    """what the inlets are fixed to: they ride on the reactor, or stand still in the laboratory while it moves over them"""
     start: Instant = 0.05
+    """when vibration and conveying start"""
     startup: Literal["developed", "impulsive"] = "developed"
+    """how a resolved run begins to vibrate: in the periodic state of the gas, or from rest with the true transient"""
 
     _table: BedProfile | None = PrivateAttr(None)
 
@@ -248,39 +264,55 @@ class Motion(Frozen):
 
 
 class Time(Frozen):
-    """End of the simulation [s]; `step` [s] of the averaged, `steps_per_cycle` of the resolved fidelity."""
+    """End of the simulation and its steps."""
 
-    end: Duration = 20.0
+    end: RunTime = 20.0
+    """simulated time at which the run ends"""
     step: Duration = 0.01
+    """longest time step of an averaged run; it is shortened to fit the shifts of the bed from column to column"""
     steps_per_cycle: Annotated[int, Strict(), Field(ge=4)] = 32
+    """time steps per cycle of the vibration in a resolved run, and phases of the flow with vibrational_dispersion"""
 
 
 class Output(Frozen):
-    """Simulated time between outputs [s]; wall time between restart states [s]."""
+    """How often results and restart states are written."""
 
-    every: Duration = 0.25
-    checkpoint: Duration = 60.0
+    every: Interval = 0.25
+    """simulated time between outputs: fields for pictures and ParaView, and rows of history.csv"""
+    checkpoint: WallTime = 60.0
+    """time on the clock between restart states, from which an interrupted run goes on"""
 
 
 class Transport(Frozen):
-    """Options of the species' transport: in `averaged` and `steady` runs, add to diffusion what the vibration disperses."""
+    """Options of the species' transport."""
 
     vibrational_dispersion: Flag = False
+    """in averaged and steady runs: add to diffusion what the swinging gas disperses, from the flow of a whole cycle"""
 
 
 class Case(Frozen):
     """One simulation. Equal cases have equal content, wherever they were read from."""
 
     title: str = ""
+    """a line that names the case on screens, pictures and in results"""
     fidelity: Literal["resolved", "averaged", "steady"] = "averaged"
+    """resolved: every phase of every vibration; averaged: their mean, in time; steady: the state that an averaged run ends in"""
     geometry: Geometry
+    """the strip: its size, layers from bottom to top, ports and zones"""
     materials: dict[str, Material] = Field({}, alias="material")
+    """porous solids by name; built-in ones need no table, and a table overrides theirs key by key"""
     gas: Gas = Gas()
+    """the carrier gas and its state"""
     chemistry: Chemistry = Chemistry()
+    """species, surface sites and reactions"""
     motion: Motion = Motion()
+    """vibration of the reactor and conveying of the bed"""
     time: Time = Time()
+    """end of the simulation and its steps"""
     output: Output = Output()
+    """how often results and restart states are written"""
     transport: Transport = Transport()
+    """options of the species' transport"""
 
     _mechanism: Mechanism = PrivateAttr()
     _source: Path | None = PrivateAttr(None)
@@ -442,7 +474,7 @@ def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, An
 
 def case_schema() -> dict[str, Any]:
     """JSON Schema of a case file, for editors."""
-    schema = write_defaults(Case.model_json_schema(by_alias=True))
+    schema = finished(Case.model_json_schema(by_alias=True))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

@@ -222,6 +222,22 @@ def _with_base(geometry: Any, folder: Path, source: str, seen: tuple[Path, ...] 
     return merge(shared, {key: value for key, value in geometry.items() if key != "base"})
 
 
+def shared_geometry(
+    data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, source: str
+) -> Table:
+    """The geometry that a case names as its base, alone; empty without one."""
+    name = overrides.get("geometry.base", _table(data, "geometry").get("base"))
+    return _with_base({"base": name}, folder, source) if isinstance(name, str) else {}
+
+
+def mechanism_tables(
+    data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, source: str
+) -> Table:
+    """The tables of the mechanism that a case names, alone; empty for an inline one."""
+    name = overrides.get("chemistry.mechanism", _table(data, "chemistry").get("mechanism", "alumina"))
+    return {} if name == "inline" else read_toml(find_file("mechanisms", name, folder, source, ""))
+
+
 def _insert_mechanism(data: Table, folder: Path, source: str) -> None:
     chemistry = data.setdefault("chemistry", {})
     name = chemistry.setdefault("mechanism", "alumina") if isinstance(chemistry, dict) else None

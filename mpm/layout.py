@@ -28,14 +28,17 @@ from pydantic import (
 
 from mpm.materials import Material
 from mpm.units import (
+    ColumnWidth,
     Deadline,
     Dimension,
     Fraction,
     Instant,
     Length,
+    PortWidth,
     Position,
     Positive,
     Speed,
+    StripLength,
     describe,
     reject,
     worked_out,
@@ -90,14 +93,20 @@ Windows = Annotated[
     tuple[tuple[float, float], ...],
     PlainValidator(_read_windows),
     PlainSerializer(_write_windows, when_used="json"),
-    WithJsonSchema({"type": "array", "items": {"type": "array", "items": {"type": "string"}}}),
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2},
+            "examples": [[["0 s", "5 s"], ["10 s", "15 s"]]],
+        }
+    ),
 ]
 
 
 class Frozen(BaseModel):
     """Base of the tables of a case file: values that do not change, keys that are known."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
 def only_name_required(schema: dict[str, Any]) -> None:
@@ -106,19 +115,22 @@ def only_name_required(schema: dict[str, Any]) -> None:
 
 
 class Layer(Frozen):
-    """A horizontal layer, `cells` rows high; `grading` (0.01 to 100) is the height of its top row over that of its bottom row.
-
-    `material` (a Material; None: gas) is resolved by the case from the name that the file gives.
-    """
+    """A horizontal layer; `material` (a Material; None: gas) is resolved by the case from the name that the file gives."""
 
     model_config = ConfigDict(json_schema_extra=only_name_required)
 
     name: Name
+    """what the layer is called in results and in keys: letters, digits, _ and -"""
     height: Length
+    """height of the layer"""
     cells: Count
+    """rows of cells in the layer: more resolve steeper fronts and take longer"""
     grading: Positive = 1.0
-    material_name: str | None = Field(None, alias="material", description="name of a material; none: gas")
+    """height of the layer's top row over that of its bottom row, 0.01 to 100; 1: equal rows"""
+    material_name: str | None = Field(None, alias="material")
+    """what fills the layer: the name of a built-in material or of a table [material.NAME]; left out: gas alone"""
     moving: Flag = False
+    """whether this is the bed, which the vibration conveys (see motion.bed_velocity); at most one layer"""
     _material: Material | None = PrivateAttr(None)
 
     @property
@@ -130,9 +142,13 @@ class _Port(Frozen):
     model_config = ConfigDict(json_schema_extra=only_name_required)
 
     name: Name
+    """what the port is called in results and in keys: letters, digits, _ and -"""
     side: Literal["bottom", "top"]
+    """the wall that the port is in"""
     center: Position
-    width: Length
+    """x of the port's centreline, from the left end of the strip"""
+    width: PortWidth
+    """width of the port along the strip; a width equal to the length makes a column in plug flow"""
 
     @property
     def x0(self) -> float:
@@ -152,11 +168,17 @@ class Inlet(_Port):
     """
 
     side: Literal["bottom", "top"] = "bottom"
+    """the wall that the inlet is in"""
     velocity: Speed = 0.035
-    mass_fractions: dict[str, Fraction] = {}
+    """speed of the gas through the inlet, at the reactor's temperature and pressure; 0: closed"""
+    mass_fractions: Annotated[dict[str, Fraction], Field(examples=[{"TMA": 2e-4}])] = {}
+    """mass fraction of each precursor in the gas of this inlet while it doses; left out: carrier gas alone (a purge)"""
     start: Instant = 0.0
-    stop: Deadline = worked_out(math.inf)
-    windows: Windows = worked_out(())
+    """when the dose begins; before that the inlet blows carrier gas"""
+    stop: Deadline = worked_out("never: the inlet doses to the end", math.inf)
+    """when the dose ends; after that the inlet blows carrier gas"""
+    windows: Windows = worked_out("one window, from start to stop", ())
+    """several doses in place of start and stop: pairs of begin and end, in order and apart"""
 
     @model_validator(mode="after")
     def _one_form_of_windows(self) -> Self:
@@ -200,15 +222,20 @@ class Outlet(_Port):
     """A stretch of wall at ambient pressure."""
 
     side: Literal["bottom", "top"] = "top"
+    """the wall that the outlet is in"""
 
 
 class Zone(Frozen):
     """A named stretch of the strip, from `start` to `end` [m], with the inlet that doses it."""
 
     name: Name
+    """what the zone is called in results and in keys: letters, digits, _ and -"""
     start: Position
-    end: Length
+    """left end of the zone, from the left end of the strip"""
+    end: StripLength
+    """right end of the zone, from the left end of the strip"""
     inlet: str | None = None
+    """name of the inlet whose precursor reacts in this zone: its titration is read where solids leave the zone"""
 
 
 def _base_may_give_it(schema: dict[str, Any]) -> None:
@@ -221,20 +248,28 @@ class Geometry(Frozen):
 
     model_config = ConfigDict(json_schema_extra=_base_may_give_it)
 
-    base: str | None = Field(
-        None, exclude=True, description="a shared geometry file or built-in name that these keys override"
-    )
-    length: Length
-    cell_width: Length = 0.34e-3
+    base: str | None = Field(None, exclude=True)
+    """a geometry to start from, the name of a built-in one or the path of a file; keys given here lie over it, list entries by name"""
+    length: StripLength
+    """length of the strip along the reactor"""
+    cell_width: ColumnWidth = 0.34e-3
+    """width of the columns of cells, rounded so that all are equal: narrower ones smear fronts less and take longer"""
     periodic: Flag = True
+    """ends of the strip for the gas. true: what leaves at one end comes in at the other (a stretch of a longer reactor); false: walls"""
     bed_inflow: Literal["fresh", "periodic"] = "fresh"
+    """solids that enter the strip: fresh with their initial_coverage, or (periodic) those that have left at the other end"""
     inlet_diffusion: Flag = False
+    """whether precursor also diffuses through the face of an inlet; false: an inlet feeds exactly velocity times concentration"""
     layers: tuple[Layer, ...] = Field(alias="layer", min_length=1)
+    """the layers of the strip, from the bottom to the top"""
     inlets: tuple[Inlet, ...] = Field((), alias="inlet")
+    """the ports that blow gas in"""
     outlets: tuple[Outlet, ...] = Field((), alias="outlet")
-    zones: tuple[Zone, ...] = Field(
-        (), alias="zone", description="default: as many equal zones as dosing inlets"
+    """the ports that let gas out, at ambient pressure"""
+    zones: tuple[Zone, ...] = worked_out(
+        "as many equal zones as inlets that dose, one in each", (), alias="zone"
     )
+    """stretches of the strip that results are given for, each with its inlet"""
 
     @property
     def columns(self) -> int:

@@ -19,13 +19,15 @@ from mpm.constants import AVOGADRO
 from mpm.units import (
     Conductivity,
     Density,
+    Diameter,
     Dimension,
     Fraction,
     HeatCapacity,
-    Length,
+    Kozeny,
     PerLength,
     Porosity,
     Positive,
+    Sphericity,
     describe,
     in_range,
     reject,
@@ -70,7 +72,10 @@ def _per_direction(dimension: Dimension) -> tuple[Any, ...]:
         return dimension.write(pair[0]) if pair[0] == pair[1] else [dimension.write(value) for value in pair]
 
     one = {"type": "string" if dimension.unit else "number", "examples": [dimension.example]}
-    schema = {"anyOf": [one, {"type": "array", "items": one, "minItems": 2, "maxItems": 2}]}
+    schema = {
+        "anyOf": [one, {"type": "array", "items": one, "minItems": 2, "maxItems": 2}],
+        **dimension.about,
+    }
     return BeforeValidator(read), PlainSerializer(write, when_used="json"), WithJsonSchema(schema)
 
 
@@ -81,8 +86,19 @@ _Sites = Annotated[
     float,
     BeforeValidator(_site_density),
     PlainSerializer(_SITES.write, when_used="json"),
-    WithJsonSchema({"type": "string", "examples": [_SITES.example, *SITE_DENSITIES], "unit": _SITES.unit}),
+    WithJsonSchema(
+        {
+            "type": "string",
+            **_SITES.about,
+            "examples": [_SITES.example, *SITE_DENSITIES],
+            "presets": [*SITE_DENSITIES],
+        }
+    ),
 ]
+
+
+PACKED_SPHERES = 5.0
+"""Kozeny's constant of packed spheres (Carman 1937)."""
 
 
 def _nothing_required(schema: dict[str, Any]) -> None:
@@ -91,30 +107,44 @@ def _nothing_required(schema: dict[str, Any]) -> None:
 
 
 class Material(BaseModel):
-    """A rigid porous solid, homogeneous within its layer.
+    """A rigid porous solid, homogeneous within its layer. Pairs are (along the reactor, through the layer)."""
 
-    permeability: (k_x, k_y) [m2], given, or by Kozeny-Carman from particle_diameter, sphericity and kozeny_constant;
-    tortuosity_factor: tau^2 along (x, y), by default Bruggeman's porosity**-0.5;
-    surface_to_volume: reactive surface per total volume [1/m], by default 6 (1 - porosity)/(sphericity d);
-    site_density [mol/m2 of surface]; initial_coverage: share of the sites in each state, sums to 1 (filled in with the
-    mechanism's first site, the fresh surface); viscosity_ratio: effective over gas viscosity in the Brinkman term.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_nothing_required)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra=_nothing_required, use_attribute_docstrings=True
+    )
 
     porosity: Porosity
-    permeability: _PairOfAreas = worked_out((0.0, 0.0))
-    tortuosity_factor: _PairOfNumbers = worked_out((0.0, 0.0))
-    surface_to_volume: PerLength = worked_out()
+    """share of the layer's volume between the particles, which gas fills"""
+    permeability: _PairOfAreas = worked_out(
+        "Kozeny-Carman from porosity, particle_diameter, sphericity and kozeny_constant", (0.0, 0.0)
+    )
+    """how easily gas flows through the layer (Darcy): one value, or two, along the reactor and through the layer"""
+    tortuosity_factor: _PairOfNumbers = worked_out("Bruggeman: porosity^-0.5", (0.0, 0.0))
+    """tau^2 in the effective diffusivity, porosity D / tau^2: one value, or two, along the reactor and through the layer"""
+    surface_to_volume: PerLength = worked_out("6 (1 - porosity) / (sphericity particle_diameter)")
+    """reactive surface per total volume of the layer: with site_density it decides how much precursor the layer takes up"""
     site_density: _Sites = SITE_DENSITIES["thesis"]
-    initial_coverage: dict[str, Fraction] = worked_out({})
+    """reactive sites per surface, a value or a preset: "thesis" is one site per 24 nm^2, "one-per-24-square-angstrom" 100 times as many"""
+    initial_coverage: dict[str, Fraction] = worked_out(
+        "all sites are the mechanism's first one, the fresh surface", {}, example={"OH": 1.0}
+    )
+    """share of the sites in each state when the solids come in; they sum to 1"""
     viscosity_ratio: Positive = 1.0
+    """effective viscosity over that of the gas in the Brinkman term, which counts within a few pores of the layer's faces"""
     density: Density | None = None
-    particle_diameter: Length | None = None
-    sphericity: Positive = 1.0
-    kozeny_constant: Positive | None = None
+    """density of the solid itself, without pores: for minimum fluidisation in `mpm check`"""
+    particle_diameter: Diameter | None = None
+    """mean diameter of the particles: for permeability and surface_to_volume where these are left out, and for fluidisation"""
+    sphericity: Sphericity = 1.0
+    """surface of a sphere of the particle's volume over the particle's surface; 1: spheres"""
+    kozeny_constant: Kozeny | None = worked_out(
+        "5, packed spheres, where particle_diameter has to give the permeability", None
+    )
+    """constant of Kozeny-Carman, with which particle_diameter gives the permeability"""
     heat_capacity: HeatCapacity | None = None
+    """of the solid, by mass; nothing reads it yet: temperature is one number, gas.temperature"""
     conductivity: Conductivity | None = None
+    """thermal conductivity of the solid; nothing reads it yet: temperature is one number, gas.temperature"""
 
     @model_validator(mode="after")
     def _fill_in(self) -> Self:
@@ -129,13 +159,14 @@ class Material(BaseModel):
                     key="kozeny_constant",
                 )
         if "permeability" not in given:
-            if d is None or self.kozeny_constant is None:
+            if d is None:
                 raise reject(
                     "nothing",
-                    'a permeability, e.g. "4.25 um^2", or particle_diameter, sphericity and kozeny_constant',
+                    'a permeability, e.g. "4.25 um^2", or a particle_diameter, with which sphericity and kozeny_constant give one',
                     key="permeability",
                 )
-            k = kozeny_carman(self.porosity, d, self.sphericity, self.kozeny_constant)
+            values["kozeny_constant"] = constant = self.kozeny_constant or PACKED_SPHERES
+            k = kozeny_carman(self.porosity, d, self.sphericity, constant)
             values["permeability"] = (in_range("permeability", k, "m^2"),) * 2
         if "tortuosity_factor" not in given:
             values["tortuosity_factor"] = (self.porosity**-0.5,) * 2

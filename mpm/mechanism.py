@@ -20,16 +20,17 @@ from mpm.chemistry import GasReaction, Mechanism, Site, Species, SurfaceReaction
 from mpm.equation import ARROW, parse_equation, write_equation
 from mpm.units import (
     LARGEST,
+    Atoms,
     Density,
     Dimension,
     Fraction,
     MolarEnergy,
     MolarMass,
-    NonNegative,
     Number,
     Temperature,
     parse,
     reject,
+    worked_out,
 )
 
 _SURFACE_RATE = Dimension("m/s", "a surface rate constant", "0.9 m/s", at_least=0.0)
@@ -48,59 +49,95 @@ def _rate_constant(value: Any) -> str:
     raise reject(repr(value), f"{_SURFACE_RATE.accepted}, or {_GAS_RATE.accepted}")
 
 
+_RateConstant = Annotated[
+    str,
+    BeforeValidator(_rate_constant),
+    WithJsonSchema(
+        {
+            "type": "string",
+            "accepted": f"{_SURFACE_RATE.accepted}, or {_GAS_RATE.accepted}",
+            "examples": [_SURFACE_RATE.example, _GAS_RATE.example],
+        }
+    ),
+]
+
+
 def _nothing_required(schema: dict[str, Any]) -> None:
     """A table in a case may override one key of a mechanism's entry."""
     schema.pop("required", None)
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_nothing_required)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_extra=_nothing_required, use_attribute_docstrings=True
+    )
 
 
 class SpeciesTable(_Table):
     """`[species.NAME]`: a gas species; elements from `formula` (default: the name) or counted by hand."""
 
     molar_mass: MolarMass
-    formula: str | None = None
-    elements: dict[str, NonNegative] | None = None
+    """molar mass of the species"""
+    formula: str | None = worked_out("the name itself", None, example="Al(CH3)3")
+    """chemical formula, whose elements the reactions must balance"""
+    elements: dict[str, Atoms] | None = worked_out(
+        "counted in the formula", None, example={"Al": 1, "C": 3, "H": 9}
+    )
+    """atoms of each element, in place of a formula"""
 
 
 class SiteTable(_Table):
     """`[site.NAME]` (a state of the surface sites)."""
 
     molar_mass: MolarMass | None = None
-    formula: str | None = None
-    elements: dict[str, NonNegative] | None = None
+    """molar mass of the group, for the check of the formula (site) and for the film's thickness (film)"""
+    formula: str | None = worked_out("the name itself", None, example="OAl(CH3)2")
+    """chemical formula, whose elements the reactions must balance"""
+    elements: dict[str, Atoms] | None = worked_out(
+        "counted in the formula", None, example={"Al": 1, "C": 3, "H": 9}
+    )
+    """atoms of each element, in place of a formula"""
 
 
 class FilmTable(SiteTable):
     """`[film.NAME]` (a solid product); with `density` and `molar_mass` its thickness is reported."""
 
     density: Density | None = None
+    """density of the film: with molar_mass, its thickness is reported"""
 
 
 class ReactionTable(_Table):
     """`[reaction.KEY]`: an equation with `sticking` or `A`, either times (T/reference_temperature)^b exp(-Ea/RT)."""
 
-    equation: str
+    equation: Annotated[str, Field(examples=["OH + TMA -> CH4 + OAl(CH3)2"])]
+    """what reacts to what; elements and sites must balance. With a site on the left it is a surface reaction, else one in the gas"""
     sticking: Fraction | None = None
-    A: Annotated[str, BeforeValidator(_rate_constant), WithJsonSchema({"type": "string"})] | None = None
+    """share of the collisions with a reactive site that react (surface reactions, in place of A)"""
+    A: _RateConstant | None = None
+    """rate constant before (T / reference_temperature)^b exp(-Ea / R T): a speed for a surface reaction, m^3/mol/s in the gas"""
     b: Number = 0.0
+    """exponent of the temperature in the rate constant"""
     Ea: MolarEnergy = 0.0
+    """activation energy"""
     reference_temperature: Temperature = 1.0
+    """temperature at which the factor of b is 1"""
 
 
 class Chemistry(_Table):
     """The `[chemistry]` table, with the mechanism's own tables merged in: complete in itself."""
 
-    mechanism: str = Field(
-        "alumina", description="a built-in mechanism, the path of a mechanism file, or inline"
-    )
-    name: str = ""
+    mechanism: str = "alumina"
+    """the reactions: the name of a built-in mechanism, the path of a mechanism file, or inline (all of it in this table)"""
+    name: str = worked_out("the mechanism's file name", "")
+    """what the mechanism is called in results"""
     species: dict[str, SpeciesTable] = {}
+    """gas species, by name; keys given here lie over the mechanism's"""
     site: dict[str, SiteTable] = {}
+    """states of the surface sites, by name; the first is the fresh surface"""
     film: dict[str, FilmTable] = {}
+    """solid products, by name"""
     reaction: dict[str, ReactionTable] = {}
+    """reactions, by name; keys given here lie over the mechanism's, e.g. chemistry.reaction.tma.sticking = 0.1"""
 
 
 _NAME = re.compile(r"[^\s.]+")

@@ -109,6 +109,6 @@ def _expected(field: FieldInfo | None) -> str:
             return item.accepted
     if field is not None and get_origin(field.annotation) is tuple:
         return "a list of tables, [[...]]"
-    return (field.description if field else None) or (
-        "a whole number" if field and field.annotation is int else "a value"
-    )
+    if field is not None and field.annotation is int:
+        return "a whole number"
+    return (field.description if field else None) or "a value"

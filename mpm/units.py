@@ -194,9 +194,7 @@ class Dimension:
         if self.unit:
             return {
                 "type": "string",
-                "description": f"{self.accepted}; SI unit {self.unit}",
-                "examples": [self.example],
-                "unit": self.unit,
+                **self.about,
                 "pattern": r"^\s*[+-]?([0-9]|\.[0-9]|inf).*[^0-9.\s]\S*\s*$",
             }
         bounds = {
@@ -205,11 +203,14 @@ class Dimension:
             "maximum": self.at_most,
             "exclusiveMaximum": self.below,
         }
-        return {
-            "type": "number",
-            "description": self.accepted,
-            **{k: v for k, v in bounds.items() if v is not None},
-        }
+        return {"type": "number", **self.about, **{k: v for k, v in bounds.items() if v is not None}}
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What a JSON Schema says of such a quantity; `accepted` becomes the end of its description (`finished`)."""
+        if self.unit:
+            return {"accepted": self.accepted, "examples": [self.example], "unit": self.unit}
+        return {"accepted": self.accepted, "examples": [float(self.example)]}
 
 
 def in_range(key: str, number: float, unit: str) -> float:
@@ -219,24 +220,16 @@ def in_range(key: str, number: float, unit: str) -> float:
     return number
 
 
-def worked_out(placeholder: Any = 0.0) -> Any:
-    """Default of a field that its model works out from others when it is left out; no default for the schema."""
-    return Field(placeholder, json_schema_extra=_without_default)
+def worked_out(source: str, placeholder: Any = 0.0, *, alias: str | None = None, example: Any = None) -> Any:
+    """Default of a field that its model works out when it is left out; the schema says from what instead of a default."""
 
+    def extra(schema: dict[str, Any]) -> None:
+        schema.pop("default", None)
+        schema["worked_out"] = source
 
-def _without_default(schema: dict[str, Any]) -> None:
-    schema.pop("default", None)
-
-
-def write_defaults(schema: Any) -> Any:
-    """Return a JSON Schema in which defaults of dimensional values stand as a case file would write them."""
-    if isinstance(schema, dict):
-        schema = {key: write_defaults(value) for key, value in schema.items()}
-        if "unit" in schema and isinstance(schema.get("default"), float):
-            schema["default"] = f"{schema['default']!r} {schema['unit']}"
-    elif isinstance(schema, list):
-        schema = [write_defaults(entry) for entry in schema]
-    return schema
+    return Field(
+        placeholder, alias=alias, json_schema_extra=extra, examples=None if example is None else [example]
+    )
 
 
 def describe(value: Any) -> str:
@@ -250,12 +243,20 @@ def describe(value: Any) -> str:
 
 
 Length = Annotated[float, Dimension("m", "a length", "3 mm", above=0.0)]
+StripLength = Annotated[float, Dimension("m", "a length", "139.7 mm", above=0.0)]
+ColumnWidth = Annotated[float, Dimension("m", "a length", "0.34 mm", above=0.0)]
+PortWidth = Annotated[float, Dimension("m", "a length", "4 mm", above=0.0)]
+Diameter = Annotated[float, Dimension("m", "a diameter", "56 um", above=0.0)]
 Position = Annotated[float, Dimension("m", "a position", "104.8 mm", at_least=0.0)]
 Area = Annotated[float, Dimension("m^2", "a permeability", "4.25 um^2", above=0.0)]
 PerLength = Annotated[float, Dimension("1/m", "a surface per volume", "58000 1/m", at_least=0.0)]
 Speed = Annotated[float, Dimension("m/s", "a speed", "3.5 cm/s", at_least=0.0)]
+BedSpeed = Annotated[float, Dimension("m/s", "a speed", "1.3 cm/s", at_least=0.0)]
 Velocity = Annotated[float, Dimension("m/s", "a velocity", "-0.40 cm/s")]
 Duration = Annotated[float, Dimension("s", "a time", "10 ms", above=0.0)]
+RunTime = Annotated[float, Dimension("s", "a time", "20 s", above=0.0)]
+WallTime = Annotated[float, Dimension("s", "a time", "60 s", above=0.0)]
+Interval = Annotated[float, Dimension("s", "a time", "0.25 s", above=0.0)]
 Instant = Annotated[float, Dimension("s", "a time", "50 ms", at_least=0.0)]
 Deadline = Annotated[float, Dimension("s", "a time", "5 s", above=0.0, infinite=True)]
 Frequency = Annotated[float, Dimension("Hz", "a frequency", "16 Hz", above=0.0)]
@@ -263,15 +264,20 @@ Angle = Annotated[float, Dimension("rad", "an angle", "60 deg")]
 Temperature = Annotated[float, Dimension("K", "a temperature", "473 K", above=0.0)]
 Pressure = Annotated[float, Dimension("Pa", "a pressure", "101325 Pa", above=0.0)]
 Density = Annotated[float, Dimension("kg/m^3", "a density", "2500 kg/m^3", above=0.0)]
+GasDensity = Annotated[float, Dimension("kg/m^3", "a density", "0.72 kg/m^3", above=0.0)]
 Viscosity = Annotated[float, Dimension("Pa*s", "a viscosity", "1.72e-5 Pa s", above=0.0)]
-Diffusivity = Annotated[float, Dimension("m^2/s", "a diffusivity", "2.88e-5 m^2/s", at_least=0.0)]
+DIFFUSIVITY = Dimension("m^2/s", "a diffusivity", "2.88e-5 m^2/s", at_least=0.0)
+Diffusivity = Annotated[float, DIFFUSIVITY]
 MolarMass = Annotated[float, Dimension("kg/mol", "a molar mass", "28.01 g/mol", above=0.0)]
 MolarEnergy = Annotated[float, Dimension("J/mol", "an activation energy", "20 kJ/mol")]
 SiteDensity = Annotated[float, Dimension("mol/m^2", "a site density", "6.92e-8 mol/m^2", above=0.0)]
 HeatCapacity = Annotated[float, Dimension("J/kg/K", "a heat capacity", "871 J/kg/K", above=0.0)]
 Conductivity = Annotated[float, Dimension("W/m/K", "a thermal conductivity", "1.3 W/m/K", above=0.0)]
 Number = Annotated[float, Dimension("", "a number", "0.5")]
+Sphericity = Annotated[float, Dimension("", "a sphericity", "0.79", above=0.0)]
+Kozeny = Annotated[float, Dimension("", "a number", "4.2", above=0.0)]
 Positive = Annotated[float, Dimension("", "a number", "1.5", above=0.0)]
 NonNegative = Annotated[float, Dimension("", "a number", "0.30", at_least=0.0)]
+Atoms = Annotated[float, Dimension("", "a number of atoms", "3", at_least=0.0)]
 Fraction = Annotated[float, Dimension("", "a fraction", "2e-4", at_least=0.0, at_most=1.0)]
 Porosity = Annotated[float, Dimension("", "a fraction", "0.46", above=0.0, below=1.0)]
