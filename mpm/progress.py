@@ -17,7 +17,7 @@ from rich.status import Status
 from rich.text import Text
 
 from mpm.parallel import is_root
-from mpm.screen import screen, spinner
+from mpm.screen import say, screen, spinner
 
 if TYPE_CHECKING:
     from mpm.reactor import Reactor
@@ -69,7 +69,7 @@ class Progress:
     def warn(self, text: str) -> None:
         """A line that stays, for the person who watches."""
         if self.shown:
-            self.console.print(f"warning: {text}", soft_wrap=True)
+            say(self.console, f"warning: {text}")
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -113,9 +113,24 @@ class Progress:
         elapsed = clock.monotonic() - self.first[0]
         speed = done / elapsed if elapsed > 0.0 else 0.0
         balances = [value for name, value in reactor.numbers.items() if name.startswith("balance.")]
-        left = (reactor.schedule.steps - reactor.steps) / speed if speed else float("nan")
-        remaining = f"{left:.0f} s left" if speed and left > 0.0 else "done" if left == 0.0 else ""
-        return (
-            f"t = {reactor.time:.3f} of {reactor.case.time.end:g} s  step {reactor.steps}  {speed:.1f} steps/s  {remaining}  "
-            f"worst balance {max(balances, default=0.0):.1e}"
+        to_do = reactor.schedule.steps - reactor.steps
+        remaining = [f"{duration(to_do / speed)} left"] if speed and to_do else ["done"] if not to_do else []
+        return ", ".join(
+            [
+                f"{reactor.time:.2f} of {reactor.case.time.end:g} s",
+                f"step {reactor.steps}",
+                f"{speed:.1f} steps/s",
+                *remaining,
+                f"balances to {max(balances, default=0.0):.0e}",
+            ]
         )
+
+
+def duration(seconds: float) -> str:
+    """A time to wait, in the two units that matter: `40 s`, `3 min 20 s`, `2 h 5 min`, `3 d 4 h`."""
+    whole = round(seconds)
+    for large, small, size, part in (("d", "h", 86400, 3600), ("h", "min", 3600, 60), ("min", "s", 60, 1)):
+        if whole >= size:
+            rest = whole % size // part
+            return f"{whole // size} {large}" + (f" {rest} {small}" if rest else "")
+    return f"{whole} s"

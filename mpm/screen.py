@@ -1,13 +1,14 @@
 """What people read on a terminal, in a pipe or in a log: whole numbers, names as they were written, in whatever encoding.
 
-Everything printed goes through here: text is no markup, tables that do not fit become lists, characters that the terminal does not
-have are spelled out instead of ending the program.
+Everything printed goes through here: text is no markup, tables are for wide terminals and lists for the others, lines break between
+words, characters that the terminal does not have are spelled out instead of ending the program.
 """
 
 from __future__ import annotations
 
 import io
 import sys
+import textwrap
 from typing import TYPE_CHECKING
 
 from mpm.errors import printable
@@ -17,6 +18,11 @@ if TYPE_CHECKING:
 
 UNLIMITED = 100_000
 """Width of what is no terminal: a pipe and a file have no edge that a number could be cut at."""
+WIDE = 100
+"""Columns from which a terminal is shown tables."""
+NARROW = 72
+"""Columns below which a value follows its label instead of standing in a column."""
+_HARD_SPACE = "\u00a0"
 
 
 def spell_out() -> None:
@@ -42,7 +48,10 @@ def spinner(console: Console) -> str:
 
 
 class Listing:
-    """Rows under column headings, printed as a table, or where that is wider than the terminal as a list of `heading value`."""
+    """Rows under column headings such as `height [mm]`: a table on a terminal that is wide enough for it, elsewhere a list.
+
+    In the list every row is `heading value unit` after `heading value unit`, a unit at every number.
+    """
 
     def __init__(self, *headings: str):
         self.headings = headings
@@ -52,19 +61,99 @@ class Listing:
         """Cells from the left; missing ones stay empty."""
         self.rows.append(tuple(printable(cell or "") for cell in cells))
 
-    def print(self, console: Console) -> None:
+    def print(self, console: Console, indent: int = 2) -> None:
         """Every cell whole: no number is cut or broken at the edge of a terminal."""
         from rich.measure import Measurement
+        from rich.padding import Padding
         from rich.table import Table
 
         table = Table(*self.headings)
         for row in self.rows:
             table.add_row(*row)
-        wanted = Measurement.get(console, console.options.update(max_width=UNLIMITED), table).maximum
-        if wanted <= console.width:
-            console.print(table)
+        framed = Padding(table, (0, 0, 0, indent), expand=False)
+        wanted = Measurement.get(console, console.options.update(max_width=UNLIMITED), framed).maximum
+        if console.is_terminal and console.width >= WIDE and wanted <= console.width:
+            console.print(framed)
             return
-        for row in self.rows:
-            name, *values = row
+        for name, *values in self.rows:
             pairs = zip(self.headings[1:], values, strict=False)
-            console.print(f"{self.headings[0]} {name}: " + ", ".join(f"{key} {v}" for key, v in pairs if v))
+            say(console, f"{name}: " + ", ".join(_entry(key, v) for key, v in pairs if v), indent)
+
+
+def _entry(heading: str, value: str) -> str:
+    """`height [mm]`, `3` as `height 3 mm`, which stays on one line."""
+    name, _, unit = heading.partition(" [")
+    return together(f"{name} {value} {unit.removesuffix(']')}".strip())
+
+
+def together(text: str) -> str:
+    """`text` as one word for `say`: a number stays with its unit."""
+    return text.replace(" ", _HARD_SPACE)
+
+
+def number(value: float, unit: str = "", digits: int = 4) -> str:
+    """`value` with its unit, kept together."""
+    return together(f"{value:.{digits}g} {unit}".strip())
+
+
+def _clean(text: str) -> str:
+    """`text` as `printable` has it, with its hard spaces."""
+    return _HARD_SPACE.join(printable(part) for part in text.split(_HARD_SPACE))
+
+
+def say(console: Console, text: str, indent: int = 0, hang: int = 4, style: str = "") -> None:
+    """Print `text`, on a terminal in lines that break between words and hang by `hang` columns under the first."""
+    from rich.text import Text
+
+    for line in lines_of(text, console.width, indent, hang):
+        console.print(Text(line, style=style), soft_wrap=True)
+
+
+def lines_of(text: str, width: int, indent: int = 0, hang: int = 4) -> list[str]:
+    """`text` in lines of at most `width` columns, broken between words; a word that is longer has a line of its own."""
+    lines = textwrap.wrap(
+        text,
+        width,
+        initial_indent=" " * indent,
+        subsequent_indent=" " * min(indent + hang, max(width - 20, 0)),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [line.replace(_HARD_SPACE, " ") for line in lines]
+
+
+class Sheet:
+    """Numbers in groups with plain headings: `label   value`, the values of all groups below each other.
+
+    room: columns that the values need on the right of their labels.
+    """
+
+    def __init__(self, room: int) -> None:
+        self.room = room
+        self.groups: list[tuple[str, list[tuple[str, str]]]] = []
+
+    def group(self, heading: str) -> None:
+        """Begin a group; one that stays empty is not printed."""
+        self.groups.append((heading, []))
+
+    def add(self, label: str, value: str | None) -> None:
+        """A row of the last group; None: the number does not exist here."""
+        if value is not None:
+            self.groups[-1][1].append((_clean(label), _clean(value)))
+
+    def print(self, console: Console) -> None:
+        """Values stand in a column; where a label leaves no room for it, and on narrow terminals, they follow it."""
+        room = min(console.width - self.room, 60)
+        rows = [row for _, group in self.groups for row in group]
+        column = max((len(label) for label, _ in rows if len(label) <= room), default=0) + 2
+        for heading, group in self.groups:
+            if not group:
+                continue
+            console.print()
+            say(console, heading, style="bold")
+            for label, value in group:
+                crowded = len(value) > console.width - column - 2 and console.width - column < 40
+                if len(label) > column - 2 or console.width < NARROW or crowded:
+                    say(console, f"{label}: {value}", 2)
+                else:
+                    say(console, f"{label:{column}}".replace(" ", _HARD_SPACE) + value, 2, column)

@@ -1,145 +1,21 @@
-"""Tables for the terminal: what `mpm check`, `mpm mesh` and `mpm run` print."""
+"""What `mpm mesh` and `mpm run` print: the mesh by layers, zones and ports; the numbers of a run, the important ones first."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rich.console import Console
-from rich.text import Text
 
 from mpm.case import Case
 from mpm.errors import printable
 from mpm.geometry import Grid
-from mpm.quantities import unit_of
-from mpm.screen import Listing
+from mpm.quantities import flatten, quantity
+from mpm.screen import Listing, Sheet, number, say
 
-
-def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
-    """Print the case and its numbers as tables."""
-    mesh, run = report["mesh"], report["run"]
-    title = Text(printable(case.title) or "case", style="bold")
-    console.print(title.append(f": {case.fidelity}, to {case.time.end:g} s", style="not bold"))
-    console.print(
-        f"{mesh['cells']:,} cells ({mesh['columns']} columns of {mesh['column_width'] * 1e3:.3g} mm, {mesh['rows']} rows), "
-        f"{run['steps']:,} steps, about {run['peak_memory_bytes'] / 1e9:.1f} GB, CFL {run['flow_courant']:.2g}"
-    )
-    for listing in (_layer_table(case), _port_table(case, report), _number_table(case, report)):
-        listing.print(console)
-    for reaction in report["reactions"]:
-        console.print(printable(reaction))
-    for sentence in report["without_effect"]:
-        console.print(Text("has no effect: ", style="yellow").append(printable(sentence), style="default"))
-    for warning in report["warnings"]:
-        console.print(Text("warning:", style="yellow").append(f" {printable(warning)}", style="default"))
-
-
-def _layer_table(case: Case) -> Listing:
-    table = Listing(
-        "layer", "height [mm]", "rows", "material", "porosity", "k [um2]", "tau2", "S [1/m]", "sites [mol/m2]"
-    )
-    for layer in reversed(case.geometry.layers):
-        cells = [
-            layer.name + (" (moving)" if layer.moving else ""),
-            f"{layer.height * 1e3:g}",
-            str(layer.cells),
-        ]
-        material = layer.material
-        if material is None:
-            table.add_row(*cells, "gas")
-            continue
-        table.add_row(
-            *cells,
-            layer.material_name,
-            f"{material.porosity:g}",
-            _pair(k * 1e12 for k in material.permeability),
-            _pair(material.tortuosity_factor),
-            f"{material.surface_to_volume:g}",
-            f"{material.site_density:.3g}",
-        )
-    return table
-
-
-def _pair(values: Iterable[float]) -> str:
-    return " / ".join(dict.fromkeys(f"{value:.3g}" for value in values))
-
-
-def _port_table(case: Case, report: dict[str, Any]) -> Listing:
-    table = Listing(
-        "port",
-        "at [mm]",
-        "width [mm]",
-        "v [cm/s]",
-        "mass fractions",
-        "doses [s]",
-        "Re",
-        "excess",
-        "dose ratio",
-    )
-    for inlet in case.geometry.inlets:
-        numbers = report["inlets"][inlet.name]
-        feed = ", ".join(f"{name} {value:g}" for name, value in inlet.mass_fractions.items())
-        times = ", ".join(f"{a:g}-{b:g}" if b < math.inf else f"from {a:g}" for a, b in inlet.windows)
-        table.add_row(
-            inlet.name,
-            f"{inlet.center * 1e3:g}",
-            f"{inlet.width * 1e3:g}",
-            f"{inlet.velocity * 1e2:g}",
-            feed or case.gas.carrier,
-            times if feed else "",
-            f"{numbers['Re']:.3g}",
-            *(f"{numbers[key]:.3g}" if key in numbers else "" for key in ("excess_number", "dose_ratio")),
-        )
-    for outlet in case.geometry.outlets:
-        table.add_row(f"{outlet.name} (outlet)", f"{outlet.center * 1e3:g}", f"{outlet.width * 1e3:g}")
-    return table
-
-
-def _number_table(case: Case, report: dict[str, Any]) -> Listing:
-    table = Listing("quantity", "value", "unit")
-    motion, bed, gas = report["motion"], report.get("bed", {}), report["gas"]
-
-    def row(name: str, value: float | None, unit: str = "", scale: float = 1.0) -> None:
-        if value is not None:
-            table.add_row(name, f"{value * scale:.4g}", unit)
-
-    row("gas density", gas["density"], "kg/m3")
-    row("gas viscosity", gas["viscosity"], "Pa s")
-    for value, origin in dict.fromkeys(
-        (d, gas["diffusivity_from"][s]) for s, d in gas["diffusivity"].items()
-    ):
-        alike = [
-            s for s, d in gas["diffusivity"].items() if (d, gas["diffusivity_from"][s]) == (value, origin)
-        ]
-        row(f"diffusivity, {origin}: {', '.join(alike)}", value, "m2/s")
-    row("mean free path of the gas", gas["mean_free_path"], "um", 1e6)
-    for name, pores in report["pores"].items():
-        row(f"{name}: diameter of its pores, sqrt(32 tau2 k/porosity)", pores["diameter"], "um", 1e6)
-        row(f"{name}: Knudsen number, mean free path over it", pores["Knudsen"])
-    row("amplitude, horizontal", motion["amplitude_x"], "mm", 1e3)
-    row("amplitude, vertical", motion["amplitude_y"], "mm", 1e3)
-    row("peak velocity, horizontal (perfect flight)", motion["perfect_flight"], "cm/s", 1e2)
-    row("peak velocity, vertical", motion["peak_velocity_y"], "cm/s", 1e2)
-    row("straight drop limit", motion["straight_drop"], "cm/s", 1e2)
-    mean = "" if case.motion.table is None else f", mean of {Path(case.motion.profile).name}"
-    row(f"bed velocity{mean}", motion["bed_velocity"], "cm/s", 1e2)
-    row("time of the bed in the strip", bed.get("residence_time"), "s")
-    row("gas rising through the bed, at most", bed.get("gas_velocity"), "cm/s", 1e2)
-    row("minimum fluidisation, Ergun", bed.get("minimum_fluidisation_ergun"), "cm/s", 1e2)
-    row("minimum fluidisation, Wen and Yu", bed.get("minimum_fluidisation_wen_yu"), "cm/s", 1e2)
-    row("gas velocity over minimum fluidisation", bed.get("gas_over_minimum_fluidisation"))
-    row("pressure drop of the bed", bed.get("pressure_drop"), "Pa")
-    row("Re of a particle", bed.get("Re_particle"))
-    for name, numbers in report["inlets"].items():
-        row(f"{name}: Pe through the bed", numbers.get("Pe_bed"))
-        row(f"{name}: Damkoehler, over convection", numbers.get("Damkoehler_convection"))
-        row(f"{name}: Damkoehler, over diffusion", numbers.get("Damkoehler_diffusion"))
-        row(f"{name}: reaction front", numbers.get("front_thickness"), "um", 1e6)
-        row(f"{name}: lifetime of a site", numbers.get("site_lifetime"), "us", 1e6)
-        row(f"{name}: lifetime in the gas", numbers.get("gas_lifetime"), "us", 1e6)
-    return table
+ROUNDING = 1e-12
+"""Share of its natural scale below which a number is printed as 0: species, sites and elements balance to about 1e-12, so nothing smaller
+is known. docs/output.md names the scales; the files of a run keep all digits."""
 
 
 def print_mesh(case: Case, console: Console) -> None:
@@ -149,69 +25,142 @@ def print_mesh(case: Case, console: Console) -> None:
     for layer in reversed(geometry.layers):
         rows = grid.layer_rows(layer.name)
         low, high = grid.y[rows.start], grid.y[rows.stop]
+        cells = f"{grid.columns * layer.cells:,}"
         regions.add_row(
-            f"layer {layer.name}",
-            f"{low * 1e3:g}",
-            f"{high * 1e3:g}",
-            f"{grid.columns}",
-            f"{layer.cells}",
-            f"{grid.columns * layer.cells:,}",
+            f"layer {layer.name}", _mm(low), _mm(high), f"{grid.columns}", f"{layer.cells}", cells
         )
-    for number, zone in enumerate(geometry.zones, start=1):
-        columns = int((grid.zone_of_column == number).sum())
+    for index, zone in enumerate(geometry.zones, start=1):
+        columns = int((grid.zone_of_column == index).sum())
+        cells = f"{columns * grid.rows:,}"
         regions.add_row(
-            f"zone {zone.name}",
-            f"{zone.start * 1e3:g}",
-            f"{zone.end * 1e3:g}",
-            f"{columns}",
-            f"{grid.rows}",
-            f"{columns * grid.rows:,}",
+            f"zone {zone.name}", _mm(zone.start), _mm(zone.end), f"{columns}", f"{grid.rows}", cells
         )
     ports = Listing("port", "side", "from [mm]", "to [mm]", "facets")
     for kind, port in [*(("inlet", p) for p in geometry.inlets), *(("outlet", p) for p in geometry.outlets)]:
         facets = int((grid.overlap(port) > 0.0).sum())
-        ports.add_row(
-            f"{kind} {port.name}", port.side, f"{port.x0 * 1e3:g}", f"{port.x1 * 1e3:g}", f"{facets}"
-        )
+        ports.add_row(f"{kind} {port.name}", port.side, _mm(port.x0), _mm(port.x1), f"{facets}")
+    zero = (
+        "at the top of the moving layer"
+        if geometry.moving_layer is not None
+        else "at the bottom of the strip"
+    )
+    say(console, f"Layers, from top to bottom (y = 0 is {zero}), and zones, from left to right", style="bold")
     regions.print(console)
+    say(console, "Ports, from left to right", style="bold")
     ports.print(console)
-    console.print(f"{grid.cells:,} cells, {grid.columns} columns of {grid.dx * 1e3:.4g} mm")
-
-
-_SUMMARY = {
-    "excess_number": "excess number",
-    "dose_ratio": "dose ratio",
-    "titration": "titration",
-    "utilisation": "utilisation",
-    "flow": "flow",
-    "cvd": "CVD",
-}
-
-
-def print_summary(summary: dict[str, Any], console: Console) -> None:
-    """Print the figures of a summary that one looks at first, and the worst balance."""
-    table, steady = Listing("quantity", "of", "value", "unit"), summary.get("fidelity") == "steady"
-    for section, title in _SUMMARY.items():
-        for name, value in _numbers(summary.get(section, {})):
-            unit = unit_of(f"{section}.{name.replace(' ', '.')}", steady)
-            table.add_row(title, name, f"{value:.4g}", "" if unit == "1" else unit)
-    table.print(console)
-    balances = [(name, value) for name, value in _numbers(summary) if name.endswith("balance_error")]
-    if balances:
-        worst, error = max(balances, key=lambda entry: abs(entry[1]))
-        console.print(f"worst balance: {error:.1e} ({printable(worst.removesuffix(' balance_error'))})")
-    counts = {
-        key: summary.get(key) for key in ("steps", "cells", "ranks", "simulated_seconds", "wall_seconds")
-    }
-    console.print(
-        ", ".join(f"{key.replace('_', ' ')} {value:g}" for key, value in counts.items() if value is not None)
+    say(
+        console,
+        f"{grid.cells:,} cells: {grid.rows} rows, {grid.columns} columns of {number(grid.dx * 1e3, 'mm')}",
     )
 
 
-def _numbers(table: dict[str, Any], prefix: str = "") -> Iterable[tuple[str, float]]:
-    """Names and values of the single numbers in nested tables; profiles are left out."""
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _numbers(value, f"{prefix}{key} ")
-        elif isinstance(value, (int, float)) and not isinstance(value, bool):
-            yield f"{prefix}{key}", value
+def _mm(value: float) -> str:
+    return f"{value * 1e3:.6g}"
+
+
+_GROUPS = (
+    ("Coating", ("titration", "film")),
+    ("Precursor use", ("utilisation", "dose_ratio", "excess_number")),
+    ("CVD and gas astray", ("cvd", "contamination")),
+    ("Gas", ("flow", "outlets")),
+    ("Fronts", ("front",)),
+)
+"""Sections of summary.json in the order in which people ask for them."""
+_FIRST = ("exit_mean", "exit_min", "exit_std", "box_mean")
+"""Order of the numbers of an inlet's titration."""
+_TWICE = ("flow.bed_pressure_drop", "flow.frit_pressure_drop")
+"""Names kept for scripts; flow.pressure_drop.<layer> says the same."""
+
+
+def print_summary(summary: dict[str, Any], console: Console, warnings: Sequence[str] = ()) -> None:
+    """Print the figures of a summary that one looks at first, the balances and the warnings of `mpm check` last."""
+    steady = summary.get("fidelity") == "steady"
+    numbers = {name: value for name, value in flatten(summary).items() if ".exit_profile." not in f".{name}."}
+    sheet = Sheet(room=22)
+    for heading, sections in _GROUPS:
+        sheet.group(heading)
+        for name in sorted(_of(numbers, sections), key=lambda name: _place(name, sections)):
+            if name in _TWICE and any(other.startswith("flow.pressure_drop.") for other in numbers):
+                continue
+            if name != "flow.mass_error":
+                sheet.add(quantity(name, steady).label, shown(name, numbers, steady))
+    _balances(sheet, summary, numbers, steady)
+    _cost(sheet, numbers, steady)
+    sheet.print(console)
+    if warnings:
+        console.print()
+    print_warnings(console, warnings)
+
+
+def print_warnings(console: Console, warnings: Iterable[str]) -> None:
+    """One paragraph for each sentence."""
+    for sentence in warnings:
+        say(console, f"warning: {printable(sentence)}", style="yellow")
+
+
+def _of(numbers: dict[str, float], sections: Sequence[str]) -> list[str]:
+    return [name for name in numbers if name.split(".")[0] in sections]
+
+
+def _place(name: str, sections: Sequence[str]) -> tuple[int, int]:
+    last = name.split(".")[-1]
+    return sections.index(name.split(".")[0]), _FIRST.index(last) if last in _FIRST else len(_FIRST)
+
+
+def shown(name: str, numbers: dict[str, float], steady: bool) -> str:
+    """A number of a run as people read it: with its unit, and 0 for what is below rounding."""
+    meant, value = quantity(name, steady), numbers[name]
+    if abs(value) < ROUNDING * natural_scale(name, numbers):
+        value = 0.0
+    return number(meant.of(value), meant.unit_shown)
+
+
+def natural_scale(name: str, numbers: dict[str, float]) -> float:
+    """What a number is large or small beside, in its own unit.
+
+    Amounts [mol/m]: the largest feed of a species. Rates per volume: that feed per second, spread over a square metre of strip (none is as
+    large). Growth per surface and thickness: 1 umol/m2, 1 nm. Flows, velocities and pressure drops of the gas: the largest of their kind.
+    Shares, coverages and mole fractions: 1. Lengths: 1 m.
+    """
+    kind, last = name.split(".")[0], name.split(".")[-1]
+    feed = max((value for key, value in numbers.items() if _is_feed(key)), default=0.0)
+    if kind == "cvd" and last.startswith("rate"):
+        return feed / max(numbers.get("simulated_seconds", 1.0), 1.0)
+    if kind in ("species", "film", "cvd") and "share_in_zone" not in name:
+        return {"per_area": 1e-6, "thickness": 1e-9}.get(last, feed)
+    if kind == "flow":
+        unit = quantity(name).unit
+        alike = (v for key, v in numbers.items() if key.startswith("flow.") and quantity(key).unit == unit)
+        return max(map(abs, alike), default=0.0)
+    return 1.0
+
+
+def _is_feed(name: str) -> bool:
+    return name.startswith("species.") and name.endswith(".fed")
+
+
+def _balances(sheet: Sheet, summary: dict[str, Any], numbers: dict[str, float], steady: bool) -> None:
+    """What became of every species, and how well the books close."""
+    sheet.group("Balances" + (" per second" if steady else "") + ", per metre of depth of the reactor")
+    for species in summary.get("species", {}):
+        terms = [
+            f"{term}\u00a0{shown(f'species.{species}.{term}', numbers, steady)}"
+            for term in ("fed", "produced", "reacted", "left", "stored")
+            if numbers.get(f"species.{species}.{term}")
+        ]
+        sheet.add(species, ", ".join(terms) or None)
+    errors = {
+        name: value for name, value in numbers.items() if name.endswith(("balance_error", "mass_error"))
+    }
+    if errors:
+        worst = max(errors, key=lambda name: abs(errors[name]))
+        sheet.add("largest relative error of a balance", f"{errors[worst]:.1e} ({quantity(worst).label})")
+
+
+def _cost(sheet: Sheet, numbers: dict[str, float], steady: bool) -> None:
+    sheet.group("Cost")
+    for name in ("simulated_seconds", "steps", "cells", "ranks", "wall_seconds"):
+        if name in numbers and not (steady and name == "simulated_seconds"):
+            meant = quantity(name, steady)
+            text = f"{numbers[name]:,.0f}" if not meant.unit else number(numbers[name], meant.unit_shown)
+            sheet.add(meant.label, text)

@@ -1,8 +1,10 @@
 """What people read: whole numbers in pipes and on narrow terminals, names as written, on terminals of any encoding."""
 
 import io
+import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -13,10 +15,15 @@ from rich.console import Console
 
 from mpm.case import load_case
 from mpm.checks import check_case
+from mpm.checkscreen import print_report
 from mpm.cli import main
-from mpm.errors import InputError
+from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
+from mpm.nextsteps import how_to_go_on
+from mpm.progress import duration
 from mpm.screen import Listing, screen
-from mpm.tables import print_mesh, print_report, print_summary
+from mpm.tables import print_mesh, print_summary
+
+from .cases import SHORT, TINY
 
 EXAMPLE = (Path(__file__).parent / "example_case.toml").read_text(encoding="utf-8")
 
@@ -39,7 +46,7 @@ def test_no_terminal_cuts_a_number(width: int) -> None:
     for show, arguments, wanted in (
         (print_report, (case, check_case(case)), ("6.92e-08", "2.85 / 2.68", "sintered_powder", "104.775", "headspace")),
         (print_mesh, (case,), ("headspace", "139.7", "28,359", "102.775")),
-        (print_summary, (summary,), ("1.792", "1.234e-10", "m^2/s")),
+        (print_summary, (summary,), ("1.792", "1.234e-06", "cm^2/s")),
     ):  # fmt: skip
         text = text_of(width, show, *arguments)
         assert "…" not in text and "..." not in text
@@ -60,13 +67,15 @@ def test_a_pipe_gets_whole_tables(
     assert not re.search(r"^│ +│", text, re.MULTILINE), "a row in two lines"
 
 
-def test_a_listing_that_does_not_fit_is_a_list() -> None:
+def test_a_listing_is_a_table_on_a_wide_terminal_only() -> None:
+    """Fails when a narrow terminal is shown a table, or a number in the list lacks its unit or is parted from it."""
     listing = Listing("port", "v [cm/s]", "excess")
     listing.add_row("tma", "3.5", "1.79")
     listing.add_row("purge", "3.5")
     lines = text_of(24, listing.print).splitlines()
-    assert lines == ["port tma: v [cm/s] 3.5, ", "excess 1.79", "port purge: v [cm/s] 3.5"]
-    assert text_of(60, listing.print).count("│") == 8
+    assert lines == ["  tma: v 3.5 cm/s,", "    excess 1.79", "  purge: v 3.5 cm/s"]
+    assert text_of(99, listing.print).count("│") == 0
+    assert text_of(100, listing.print).count("│") == 8
 
 
 NAMES = [
@@ -142,3 +151,101 @@ def test_terminals_that_are_not_utf8(environment: dict[str, str], tmp_path: Path
         capture_output=True, timeout=120,
     )  # fmt: skip
     assert wrong.returncode == 2 and wrong.stderr.count(b"\n") == 1, wrong.stderr
+
+
+def numbers_of_a_run(**changes: float) -> dict[str, Any]:
+    """A summary with a number of every group."""
+    return {
+        "fidelity": "averaged",
+        "simulated_seconds": 20.0,
+        "cells": 100,
+        "titration": {"tma": {"box_mean": 0.4, "exit_mean": 0.98, "exit_min": 0.9, "exit_profile": [0.9, 1.0]}},
+        "utilisation": {"tma": 0.5},
+        "cvd": {"rate_mean": 1e-30, "total": changes.get("cvd", 2.5e-9)},
+        "flow": {"inflow": 4e-4, "bed_superficial_velocity": [1e-21, 2e-3], "bed_pressure_drop": 50.0, "pressure_drop": {"bed": 50.0}},
+        "outlets": {"zone1": {"x": {"TMA": 1.1e-32, "H2O": 2e-6}}},
+        "species": {"TMA": {"fed": 1e-5, "left": 1e-25, "reacted": 1e-5, "balance_error": 3e-14}},
+    }  # fmt: skip
+
+
+def test_the_numbers_of_a_run() -> None:
+    """Fails when what is below rounding is printed as a result, a unit is missing, the coating is not first or the balance not last."""
+    text = " ".join(text_of(80, print_summary, numbers_of_a_run()).split())
+    for part in (
+        "coverage where solids leave the zone of tma, worst row 0.9",
+        "parasitic CVD, mean rate 0 mol/m^3/s",
+        "parasitic CVD, total 0.0025 umol/m",
+        "superficial gas velocity in the bed, along 0 cm/s",
+        "superficial gas velocity in the bed, upwards 0.2 cm/s",
+        "mole fraction of TMA in zone1 0",
+        "mole fraction of H2O in zone1 2e-06",
+        "TMA: fed 10 umol/m, reacted 10 umol/m, left 0 umol/m",
+        "largest relative error of a balance: 3.0e-14 (balance error of TMA)",
+    ):
+        assert part in text
+    assert text.count("pressure drop of") == 1
+    order = [
+        text.index(word) for word in ("leave the zone", "precursor used", "CVD", "fed by all", "balance")
+    ]
+    assert order == sorted(order)
+    assert "parasitic CVD, total 0 umol/m" in " ".join(
+        text_of(80, print_summary, numbers_of_a_run(cvd=1e-18)).split()
+    )
+
+
+def test_a_steady_summary_is_per_second() -> None:
+    text = " ".join(text_of(120, print_summary, {**numbers_of_a_run(), "fidelity": "steady"}).split())
+    assert "parasitic CVD, total 0.0025 umol/m/s" in text and "Balances per second" in text
+    assert "simulated time" not in text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.4, "0 s"),
+        (59.4, "59 s"),
+        (60, "1 min"),
+        (200, "3 min 20 s"),
+        (7500, "2 h 5 min"),
+        (273600, "3 d 4 h"),
+    ],
+)
+def test_time_to_wait(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_a_finished_run_names_the_next_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when the end of a run does not say what to type next, forgets the warnings, or the command that it names does not work."""
+    monkeypatch.chdir(tmp_path)
+    tiny = [
+        part
+        for key, value in {**TINY, **SHORT, "time.end": "0.1 s"}.items()
+        for part in ("--set", f"{key}={value}")
+    ]
+    assert main(["run", "single_zone", "-o", "a run", *tiny]) == 0
+    out = capfd.readouterr().out
+    assert "warning: upwinding in columns" in out
+    steps = [shlex.split(line, comments=True) for line in out[out.index("Next:") :].splitlines()[1:]]
+    assert [step[:2] for step in steps] == [["mpm", "report"], ["mpm", "plot"], ["mpm", "run"]]
+    assert all("a run" in step for step in steps)
+    assert main(steps[-1][1:]) == 0
+    assert json.loads(Path("a run", "summary.json").read_text())["simulated_seconds"] == 0.2
+
+
+def test_a_run_that_stops_says_how_to_go_on(tmp_path: Path) -> None:
+    """Fails when the line after Ctrl-C or a failure forgets what is kept and what resumes it, or promises what is not there."""
+    for error in (Interrupted("interrupted at t = 3 s"), ConvergenceError("step 3: no"), BalanceError("TMA")):
+        directory = tmp_path / type(error).__name__
+        directory.mkdir()
+        with pytest.raises(type(error)) as caught, how_to_go_on(directory):
+            raise error
+        assert str(caught.value) == str(error)
+        (directory / "checkpoint.npz").touch()
+        with pytest.raises(type(error)) as caught, how_to_go_on(directory):
+            raise error
+        assert str(caught.value).startswith(str(error)) and f"mpm resume {directory} goes on" in str(
+            caught.value
+        )
+        assert "\n" not in str(caught.value)

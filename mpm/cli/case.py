@@ -57,7 +57,7 @@ def check(
 
         print(json.dumps({**report, "case": loaded.to_dict()}, indent=2, allow_nan=False))
         return
-    from mpm.tables import print_report
+    from mpm.checkscreen import print_report
 
     print_report(loaded, report, screen())
 

@@ -33,11 +33,10 @@ def run(
     loaded = load_case(case, parse_settings(settings))
     directory = output or Path("results") / Path(case).stem
 
+    from mpm.nextsteps import how_to_go_on, print_end
     from mpm.reactor import Reactor
 
-    result = Reactor(loaded).run(output=directory, resume=resume, overwrite=overwrite, progress=not quiet)
+    with how_to_go_on(directory):
+        result = Reactor(loaded).run(output=directory, resume=resume, overwrite=overwrite, progress=not quiet)
     if rank() == 0 and not quiet:
-        from mpm.tables import print_summary
-
-        print_summary(result.summary, screen())
-        print(f"Results: {directory}")
+        print_end(loaded, result.summary, directory, screen())
