@@ -281,6 +281,9 @@ class Output(Frozen):
     """simulated time between outputs: fields for pictures and ParaView, and rows of history.csv"""
     checkpoint: WallTime = 60.0
     """time on the clock between restart states, from which an interrupted run goes on"""
+    phases: Annotated[int, Strict(), Field(ge=0, examples=[16])] = 0
+    """phases of the vibration at which the last cycle is written for ParaView, with the points moving as the reactor does; a divisor of
+    time.steps_per_cycle; 0: none"""
 
 
 class Transport(Frozen):
@@ -325,6 +328,7 @@ class Case(Frozen):
             if layer.material_name is not None:
                 layer._material = self.materials[layer.material_name]
         self._check_chemistry()
+        self._check_phases()
         check_rates(self._mechanism, self.gas.temperature)
         self.gas.complete(self._mechanism)
         if self.transport.vibrational_dispersion and self.fidelity == "resolved":
@@ -344,6 +348,22 @@ class Case(Frozen):
                         key="motion.inlet_frame",
                     )
         return self
+
+    def _check_phases(self) -> None:
+        asked, steps = self.output.phases, self.time.steps_per_cycle
+        if asked and self.fidelity != "resolved":
+            raise reject(
+                f"{asked} in a run with fidelity {self.fidelity}, which follows the mean of the cycle, not its phases",
+                '0, or fidelity = "resolved"',
+                key="output.phases",
+            )
+        if asked and steps % asked:
+            fitting = ", ".join(str(n) for n in range(1, steps + 1) if steps % n == 0)
+            raise reject(
+                f"{asked}, phases that do not fall on the steps of the cycle",
+                f"0 (none), or one of {fitting}, which divide time.steps_per_cycle = {steps}",
+                key="output.phases",
+            )
 
     def _check_chemistry(self) -> None:
         species, sites = self._mechanism.species_names, self._mechanism.site_names

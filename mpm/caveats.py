@@ -10,7 +10,9 @@ from mpm.diffusion import carrier_ratio, scaled_diffusivity
 from mpm.elements import formula_mass
 from mpm.gases import CARRIERS, ideal_gas_density
 from mpm.mechanism import parse_formula
+from mpm.phases import LastCycle
 from mpm.profile import PRESETS
+from mpm.schedule import Schedule
 
 if TYPE_CHECKING:
     from mpm.case import Case
@@ -125,6 +127,30 @@ def steady_caveats(case: Case) -> list[str]:
         f"inlet {inlet.name} stops dosing at {inlet.windows[-1][1]:g} s: in the steady state it blows carrier gas alone"
         for inlet in case.geometry.inlets
         if any(inlet.mass_fractions.values()) and not inlet.stays_open
+    ]
+
+
+def output_caveats(case: Case) -> list[str]:
+    """Output times of a resolved run that always meet the same phase of the vibration, and a run too short for a whole cycle."""
+    if case.fidelity != "resolved" or case.motion.gamma == 0.0:
+        return []
+    period, schedule = 1.0 / case.motion.frequency, Schedule.from_case(case)
+    cycle = f"{period * 1e3:.4g} ms"
+    if case.output.phases:
+        if not LastCycle.of(case, schedule).empty:
+            return []
+        return [
+            f"output.phases: the run ends at {case.time.end:g} s, before the first whole cycle of {cycle} since the vibration starts at "
+            f"{case.motion.start:g} s: no phases are written"
+        ]
+    every, steps = case.output.every, case.time.steps_per_cycle
+    drift = abs(every - round(every / period) * period) * case.time.end / every  # over the run
+    if every < 0.5 * period or drift > schedule.dt:
+        return []
+    fitting = 16 if steps % 16 == 0 else steps
+    return [
+        f"outputs every {every:g} s always meet the same phase of the vibration (cycles of {cycle}): output.phases = {fitting} "
+        "writes the last cycle phase by phase"
     ]
 
 

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.caseio import read_toml
+from mpm.case import Output
+from mpm.caseio import merge, read_toml
 from mpm.diagnostics import Totals
 from mpm.errors import InputError
 from mpm.files import read_text
@@ -150,7 +151,8 @@ def check_same_case(directory: RunDirectory, case: Case, state: State | None) ->
             "accepted: a run begun anew (--overwrite)"
         )
     same_profile = meta.get("profile") == mine["profile"]
-    old = read_toml(path) if path.exists() else {}
+    # a directory from before a key of [output] existed has its default
+    old = merge({"output": Output().model_dump(mode="json")}, read_toml(path)) if path.exists() else {}
     allowed = {"time.end", "motion.profile"} if same_profile else {"time.end"}
     changed = (
         [key for key in _differences(old, tomllib.loads(case.to_toml())) if key not in allowed] if old else []

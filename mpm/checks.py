@@ -7,7 +7,14 @@ from typing import Any
 
 from mpm import engineering as eng
 from mpm.case import Case
-from mpm.caveats import feed_caveats, gas_caveats, mass_caveats, profile_caveats, steady_caveats
+from mpm.caveats import (
+    feed_caveats,
+    gas_caveats,
+    mass_caveats,
+    output_caveats,
+    profile_caveats,
+    steady_caveats,
+)
 from mpm.chemistry import inlet_concentrations
 from mpm.dem.relations import (
     mean_free_path,
@@ -190,6 +197,7 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
         *mass_caveats(case),
         *feed_caveats(case),
         *steady_caveats(case),
+        *output_caveats(case),
     ]
     motion, bed = report["motion"], report.get("bed", {})
     speed = abs(case.motion.mean_velocity)

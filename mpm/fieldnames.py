@@ -66,6 +66,8 @@ FIELDS = (
     FieldName("C_<species>", "concentration of {}", "mol/m^3", scale="log"),
     FieldName("cvd_rate", "rate of parasitic CVD", "mol/m^3/s", scale="log"),
     FieldName("velocity", "speed of the gas (superficial, relative to the reactor)", "m/s", "cm/s"),
+    FieldName("velocity_lab", "speed of the gas in the laboratory (superficial)", "m/s", "cm/s"),
+    FieldName("bed_velocity", "speed of the bed relative to the reactor", "m/s", "cm/s"),
     FieldName("velocity_x", "gas velocity along x (superficial)", "m/s", "cm/s", colours="PuOr_r", signed=True),
     FieldName("velocity_y", "gas velocity upwards (superficial)", "m/s", "cm/s", colours="PuOr_r", signed=True),
     FieldName("pressure", "pressure of the gas above the outlets", "Pa"),

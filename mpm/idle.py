@@ -45,6 +45,8 @@ def _of_motion(case: Case) -> Idle:
             ["vibrational_dispersion"] if dispersed else [],
             "nothing vibrates (gamma = 0)",
         )
+        phases = ["phases"] if case.output.phases else []
+        yield from _typed(case.output, "output", phases, "nothing vibrates (gamma = 0)")
     elif not case.follows_cycle:
         cycle = (*_CYCLE, "inlet_frame", *(() if motion.table is not None else ("gamma", "profile")))
         why = f"a run with fidelity {case.fidelity} sees the bed's mean velocity, not the cycle (vibrational_dispersion would)"

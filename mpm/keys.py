@@ -53,6 +53,7 @@ READ_BY = {
     "time.steps_per_cycle": _CYCLE,
     "output.every": _TIMED,
     "output.checkpoint": _TIMED,
+    "output.phases": "resolved",
     "transport.vibrational_dispersion": "averaged, steady",
 }
 """Fidelities that read a key, where not all of them do (`mpm.idle` says so of a case)."""
@@ -69,6 +70,7 @@ _TOGETHER = (
     ("geometry.inlet.<name>.velocity", "geometry.inlet.<name>.width", "geometry.inlet.<name>.mass_fractions"),
     ("geometry.length", "geometry.cell_width", "geometry.periodic"),
     ("geometry.layer.<name>.height", "geometry.layer.<name>.cells", "geometry.layer.<name>.grading"),
+    ("output.phases", "output.every", "time.steps_per_cycle", "motion.frequency"),
     ("gas.carrier", "gas.molar_mass", "gas.viscosity", "gas.density", "gas.temperature", "gas.pressure"),
     ("gas.diffusivity", "gas.carrier", "gas.temperature", "gas.pressure"),
     ("fidelity", "time.end", "time.step", "time.steps_per_cycle", "transport.vibrational_dispersion"),

@@ -4,6 +4,7 @@
 |---|---|
 | `case.toml` | the resolved case, runnable again |
 | `fields.pvd`, `fields/fields_000000.vtu` ... | all fields on one grid, one file per output time |
+| `phases.pvd`, `phases/phases_000000.vtu` ... | the last cycle phase by phase, where `output.phases` asks for it |
 | `history.csv` | one row per output time, first column `time` |
 | `summary.json` | the numbers of the finished run, SI units |
 | `flux.csv` | gas velocity through the upper face of every layer along x, mean of a cycle |
@@ -23,7 +24,7 @@ import json
 import logging
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -31,9 +32,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpm import vtu
-from mpm.errors import FULL, ConvergenceError, InputError, MpmError
+from mpm.errors import FULL, InputError, MpmError
 from mpm.files import flush, load_arrays, load_json, lock, write_atomically
 from mpm.history import History
+from mpm.series import Series, check_finite
 
 if TYPE_CHECKING:
     from mpm.geometry import Grid
@@ -42,23 +44,27 @@ log = logging.getLogger("mpm")
 OWN_FILES = (
     "case.toml",
     "fields.pvd",
+    "phases.pvd",
     "history.csv",
     "summary.json",
     "flux.csv",
     "checkpoint.npz",
 )
-OWN_PATTERNS = ("fields/fields_*.vtu", "plots/*.png", "*.tmp", "fields/*.tmp", "plots/*.tmp")
+OWN_PATTERNS = (
+    *("fields/fields_*.vtu", "phases/phases_*.vtu", "plots/*.png"),
+    *("*.tmp", "fields/*.tmp", "phases/*.tmp", "plots/*.tmp"),
+)
 META = "__meta__"
 PATIENCE = 3.0  # seconds to wait for a directory whose last run is just being killed
 
 
 class RunDirectory:
-    """Files of the run in `path`; `precision` (Float32, Float64) is that of the fields on disk."""
+    """Files of the run in `path`; `precision` (Float32, Float64) is that of the fields on disk: `fields` at the output times, `phases`."""
 
     def __init__(self, path: str | Path, precision: str = "Float32"):
         self.path = Path(path)
-        self.precision = precision
-        self._steps: list[tuple[float, str]] | None = None
+        self.fields = Series(self.path, "fields", precision)
+        self.phases = Series(self.path, "phases", precision)
         self._history: History | None = None
         self._lock: IO[bytes] | None = None
 
@@ -68,7 +74,7 @@ class RunDirectory:
 
     @property
     def pvd(self) -> Path:
-        return self.path / "fields.pvd"
+        return self.fields.pvd
 
     @property
     def plots(self) -> Path:
@@ -113,7 +119,9 @@ class RunDirectory:
             for path in self.path.glob(pattern):
                 path.unlink()
         os.truncate(self.log, 0)  # not removed: it carries the lock
-        self._steps = self._history = None
+        self.fields.forget()
+        self.phases.forget()
+        self._history = None
 
     def write_case(self, text: str) -> None:
         """Write `case.toml`."""
@@ -124,45 +132,15 @@ class RunDirectory:
     @property
     def steps(self) -> list[tuple[float, str]]:
         """Time [s] and file name of the fields written so far, relative to the directory."""
-        if self._steps is None:
-            self._steps = [(time, str(path.relative_to(self.path))) for time, path in vtu.read_pvd(self.pvd)]
-        return self._steps
+        return self.fields.steps
 
-    def write_fields(
-        self,
-        time: float,
-        grid: Grid,
-        cell_data: Mapping[str, ArrayLike],
-        displacement: Sequence[float] = (0.0, 0.0),
-    ) -> None:
-        """Write one time step and list it in `fields.pvd`.
-
-        `cell_data`: name -> (cells,) or (cells, 2), cells in the grid's order. `zone` and `layer` (numbers, see
-        `Grid`) are added. `displacement` [m] of the reactor moves the points of this step; velocities stay relative
-        to the reactor.
-        """
-        name = f"fields/fields_{len(self.steps):06d}.vtu"
-        data = {
-            "zone": np.tile(grid.zone_of_column, grid.rows),
-            "layer": np.repeat(grid.row_layer, grid.columns),
-            **cell_data,
-        }
-        for key, values in cell_data.items():
-            _check_finite(values, f"{name}: {key}")
-        points = vtu.grid_points(grid.x, grid.y, displacement)
-        content = vtu.encode_vtu(
-            points, vtu.grid_quads(grid.columns, grid.rows), data, float(time), self.precision
-        )
-        (self.path / "fields").mkdir(exist_ok=True)
-        write_atomically(self.path / name, content)
-        self.steps.append((float(time), name))
-        vtu.add_to_pvd(self.pvd, self.steps)
+    def write_fields(self, time: float, grid: Grid, cell_data: Mapping[str, ArrayLike]) -> None:
+        """Write the fields of one output time and list it in `fields.pvd`, see `Series.write`."""
+        self.fields.write(time, grid, cell_data)
 
     def read_fields(self, index: int = -1) -> vtu.Snapshot:
         """One of the time steps listed in `fields.pvd`, the last one by default."""
-        if not self.steps:
-            raise InputError(f"{self.pvd}: no fields have been written")
-        return vtu.read_vtu(self.path / self.steps[index][1])
+        return self.fields.read(index)
 
     # ------------------------------------------------------------------ history and summary
 
@@ -208,8 +186,8 @@ class RunDirectory:
         when an array is not finite; the old state stays.
         """
         for name, values in arrays.items():
-            _check_finite(values, f"checkpoint.npz: {name}")
-        for path in (self.table.path, self.pvd):
+            check_finite(values, f"checkpoint.npz: {name}")
+        for path in (self.table.path, self.fields.pvd, self.phases.pvd):
             if path.exists():
                 flush(path)
         buffer = io.BytesIO()
@@ -231,34 +209,21 @@ class RunDirectory:
             raise InputError(f"{path}: not a checkpoint of mpm (no {META})") from error
         return arrays, meta
 
-    def cut_back(self, rows: int, time: float) -> None:
+    def cut_back(self, rows: int, time: float, cycle: float = math.inf) -> None:
         """Drop all but the first `rows` output times, those of the restart state at `time` [s]; later output continues the numbering.
 
-        Files that `fields.pvd` does not list any more, unfinished ones, and the summary of an earlier end are deleted. Raises InputError
-        when a table is damaged or lacks some of those rows, before anything is changed.
+        Of the phases those from `cycle` [s], where the last cycle begins, up to the restart state stay. Files that the lists do not name
+        any more, unfinished ones, and the summary of an earlier end are deleted. Raises InputError when a table is damaged or lacks some
+        of those rows, before anything is changed.
         """
-        steps, table = self.steps[:rows], self.table
-        table.cut_back(rows, time)
-        self._steps = steps
-        if self.pvd.exists():
-            write_atomically(self.pvd, vtu.encode_pvd(self._steps))
+        _ = self.steps, self.phases.steps  # read both lists before anything is changed
+        self.table.cut_back(rows, time)
+        self.fields.keep(lambda place, _: place < rows)
+        self.phases.keep(lambda _, written: cycle < written <= time)
         for name in ("summary.json", "flux.csv"):
             (self.path / name).unlink(missing_ok=True)
-        listed = {self.path / name for _, name in self._steps}
-        for path in [
-            *self.path.glob("fields/fields_*.vtu"),
-            *self.path.glob("*.tmp"),
-            *self.path.glob("fields/*.tmp"),
-        ]:
-            if path not in listed:
-                path.unlink()
-
-
-def _check_finite(values: ArrayLike, name: str) -> None:
-    """Raise ConvergenceError when a number is not one."""
-    array = np.asarray(values)
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise ConvergenceError(f"{name} is not finite; nothing of it has been written")
+        for path in self.path.glob("*.tmp"):
+            path.unlink()
 
 
 def plain(value: Any, where: str, drop: bool = False) -> Any:

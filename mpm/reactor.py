@@ -28,6 +28,7 @@ from mpm.history import Row, columns_of
 from mpm.motion import BedMotion, step_motion
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, largest, on_root, total
+from mpm.phases import LastCycle, phase_fields
 from mpm.progress import Progress, log_file
 from mpm.replay import March, Replay
 from mpm.schedule import Schedule, Step
@@ -71,6 +72,7 @@ class Reactor:
         self.identity = checkpoint.identity(case)  # now: the profile's file may change while the run goes on
         self.grid = Grid.from_case(case)
         self.schedule = Schedule.from_case(case)
+        self.last_cycle = LastCycle.of(case, self.schedule)
         self.strip = Strip(case, comm)
         self.motion = BedMotion(case.motion)
         self.bed = Bed(case, self.strip)
@@ -84,6 +86,7 @@ class Reactor:
         self.stored_initially = total(comm, self.transport.concentration @ self.transport.gas_volume)
         self.before: Totals | None = None
         self.kept: float | None = None  # time of the restart state on disk [s]
+        self.phases_lost = 0  # phases of the last cycle before that state that were not written: it was not the last cycle then
         self._stop = False
 
     # --- running ---
@@ -132,6 +135,7 @@ class Reactor:
             try:
                 if self.kept is not None:
                     log.info("resumed at t = %g s, after step %d", self.time, self.steps)
+                    self._tell_lost_phases(bar)
                 else:
                     self._start(bar)
                     log.info("flow found after %.1f s", self.wall)
@@ -146,6 +150,15 @@ class Reactor:
         summary = summarise(self, "done", self.wall)
         self._write_numbers(directory, summary)
         return Result(self, summary)
+
+    def _tell_lost_phases(self, bar: Progress) -> None:
+        if self.phases_lost > 0:
+            text = (
+                f"output.phases: {self.phases_lost} of the {self.case.output.phases} phases of the last cycle lie before "
+                f"t = {self.time:g} s, where this run goes on, and were not written"
+            )
+            log.warning("warning: %s", text)
+            bar.warn(text)
 
     @property
     def wall(self) -> float:
@@ -177,11 +190,12 @@ class Reactor:
             checkpoint.restore(self, *state)
             self.kept, rows = self.time, state[1]["rows"]
 
-            def cut_back() -> list[Row]:
-                directory.cut_back(rows, self.time)
-                return list(directory.table.rows)
+            def cut_back() -> tuple[list[Row], int]:
+                directory.cut_back(rows, self.time, self.last_cycle.since)
+                return list(directory.table.rows), len(directory.phases.steps)
 
-            self.rows = on_root(self.comm, cut_back)
+            self.rows, phases = on_root(self.comm, cut_back)
+            self.phases_lost = self.last_cycle.passed(self.schedule, self.steps) - phases
             self.numbers = self.rows[-1] if self.rows else {}
         elif resume:
             on_root(self.comm, lambda: directory.cut_back(0, 0.0))
@@ -261,6 +275,7 @@ class Reactor:
             if self.schedule.is_output(step, every):
                 self._write(directory, callback, step)
                 log.info("%s", bar.line())
+            self._write_phase(directory, step)
             if self.steps == self.schedule.steps:
                 break
             due = clock.monotonic() - last_checkpoint > self.case.output.checkpoint
@@ -326,6 +341,20 @@ class Reactor:
             on_root(self.comm, write)
         if callback is not None:
             callback(self)
+
+    def _write_phase(self, directory: RunDirectory | None, step: Step) -> None:
+        """Write what `step` has led to when it is one of the wanted phases of the last cycle."""
+        number = self.last_cycle.number(step)
+        if directory is None or number is None:
+            return
+        usual = self.fields(step)
+
+        def write() -> None:
+            fields = phase_fields(usual, self.case, self.grid, self.motion, step)
+            moved = self.motion.vibration.displacement(step.since + step.dt)
+            directory.phases.write(self.time, self.grid, fields, moved, number)
+
+        on_root(self.comm, write)
 
     def _keep(self, directory: RunDirectory) -> None:
         """Write the restart state. Raises BalanceError when it is out of balance: then the last good one stays."""

@@ -158,12 +158,15 @@ def test_expected_steps(case: Case) -> None:
         ({"motion.bed_velocity": "3 cm/s"}, "above perfect flight"),
         ({"geometry.inlet.tma.velocity": "10 cm/s"}, "minimum fluidisation"),
         ({"geometry.inlet.tma.mass_fractions.TMA": 0.021}, "not dilute"),
-        ({"fidelity": "resolved", "time.steps_per_cycle": 4}, "CFL above 1"),
+        ({"fidelity": "resolved", "time.steps_per_cycle": 4, "output.phases": 4}, "CFL above 1"),
         (
             {"time.step": "0.1 s"},
             "columns in a step, which leaves stripes of single columns in the coverage: lower time.step to 26.2 ms",
         ),
-        ({"fidelity": "resolved", "geometry.cell_width": "2 mm"}, "per cent to diffusion"),
+        (
+            {"fidelity": "resolved", "geometry.cell_width": "2 mm", "output.every": "0.23 s"},
+            "per cent to diffusion",
+        ),
         ({"fidelity": "steady", "geometry.inlet.tma.stop": "5 s"}, "inlet tma stops dosing at 5 s"),
     ],
 )

@@ -49,7 +49,7 @@ def fields(grid: Grid, t: float) -> dict[str, np.ndarray]:
 
 def write_run(directory: RunDirectory, grid: Grid, times: list[float]) -> None:
     for t in times:
-        directory.write_fields(t, grid, fields(grid, t), displacement=(1e-3 * t, -2e-3 * t))
+        directory.fields.write(t, grid, fields(grid, t), displacement=(1e-3 * t, -2e-3 * t))
         directory.append_history({"time": t, "balance.TMA": 1e-12 * t})
 
 
