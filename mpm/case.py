@@ -27,12 +27,13 @@ from pydantic import (
     model_validator,
 )
 
-from mpm.caseio import assemble, built_in_files, find_file, read_toml, write_toml
+from mpm.caseio import assemble, built_in_files, find_file, write_toml
 from mpm.chemistry import Mechanism
 from mpm.constants import GRAVITY
 from mpm.diffusion import scaled_diffusivity
 from mpm.files import is_file, read_text
 from mpm.gases import CARRIERS, ideal_gas_density
+from mpm.kinds import CASE, read_input
 from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
 from mpm.mechanism import Chemistry, build_mechanism, check_rates
@@ -487,7 +488,7 @@ def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, An
     path = Path(source)
     if isinstance(source, str) and not is_file(path) and source in built_in_files("cases"):
         path = find_file("cases", source, Path.cwd(), source, "")
-    case = _build(read_toml(path), overrides or {}, path.resolve().parent, str(source))
+    case = _build(read_input(path, CASE), overrides or {}, path.resolve().parent, str(source))
     case._source = path
     return case
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mpm.case import Case, load_case
 from mpm.errors import InputError, MpmError
 from mpm.geometry import Grid
+from mpm.kinds import RUN, kind_of_directory, what_it_is
 from mpm.output import RunDirectory
 from mpm.vtu import Snapshot
 
@@ -66,12 +67,8 @@ def load_run(directory: str | Path, say: Callable[[str], None] | None = None) ->
     With `say`, a damaged file that the rest can do without is named to it and counts as missing.
     """
     path = Path(directory)
-    if not (path / "case.toml").is_file():
-        raise InputError.at(path, "", what_it_is(path), "the directory of a run, with its case.toml")
-    if any(path.glob("seed_*")):
-        raise InputError.at(
-            path, "", "what `mpm dem` wrote, with pictures in plots/", "the directory of a run"
-        )
+    if kind_of_directory(path) is not RUN:
+        raise InputError.at(path, "", what_it_is(path), "the directory of a run")
     files = RunDirectory(path)
     case = load_case(path / "case.toml")
 
@@ -88,17 +85,6 @@ def load_run(directory: str | Path, say: Callable[[str], None] | None = None) ->
     summary = unless_damaged(files.read_summary, None) or {}
     steps: list[tuple[float, str]] = unless_damaged(lambda: files.steps, [])
     return Run(files, case, Grid.from_case(case), history, summary, steps)
-
-
-def what_it_is(path: Path) -> str:
-    """A directory without case.toml, in words."""
-    if not path.exists():
-        return "no such directory"
-    if not path.is_dir():
-        return "a file"
-    if (path / "sweep.json").exists() or (path / "driver").is_dir():
-        return "a sweep, with pictures in plots/ and its runs in points/"
-    return "a directory without case.toml"
 
 
 def fed_by(inlet: Inlet, species: Sequence[str]) -> list[str]:

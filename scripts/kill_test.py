@@ -53,10 +53,11 @@ PATIENCE = 300.0  # seconds for a run that is not killed
 
 
 def start(case: Path, directory: Path, ranks: int) -> subprocess.Popen[bytes]:
-    """`mpm run --resume` in a session of its own."""
+    """`mpm run`, resumed where a run has begun, in a session of its own."""
     launcher = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks > 1 else []
+    way = "--resume" if (directory / "case.toml").exists() else "--overwrite"
     command = [
-        *launcher, sys.executable, "-m", "mpm", "run", str(case), "-o", str(directory), "--resume", "--quiet",
+        *launcher, sys.executable, "-m", "mpm", "run", str(case), "-o", str(directory), way, "--quiet",
     ]  # fmt: skip
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     with open(directory.with_suffix(".err"), "wb") as errors:
@@ -72,6 +73,12 @@ def kill(process: subprocess.Popen[bytes]) -> None:
         except ProcessLookupError:
             continue
     process.wait()
+
+
+def done(directory: Path) -> bool:
+    """Whether the run has reached its end: one killed while it leaves has nothing to resume."""
+    summary = directory / "summary.json"
+    return summary.exists() and json.loads(summary.read_text(encoding="utf-8"))["status"] == "done"
 
 
 def lines(directory: Path) -> int:
@@ -153,15 +160,20 @@ class Bench:
     def killed(self, name: str, most: int) -> tuple[int, float | None]:
         """Kill a run at random moments until it is done, or `most` times; how often, and how it differs (None: identical bytes)."""
         directory, kills = self.folder / name, 0
-        while kills < most:
+        while kills < most and not done(directory):
             process = start(self.case, directory, self.ranks)
             anywhere = self.moments.random() < 0.2
             until = 0 if anywhere else lines(directory) + 2
             if not wait(process, self.moments.uniform(0.0, 0.6 * self.march), directory, until):
+                if process.returncode != 0:
+                    raise RuntimeError(
+                        directory.with_suffix(".err").read_text(encoding="utf-8", errors="replace")
+                    )
                 break
             kill(process)
             kills += 1
-        self.finish(directory)
+        if not done(directory):
+            self.finish(directory)
         same = (directory / "history.csv").read_bytes() == (self.whole / "history.csv").read_bytes()
         one, other = (
             json.loads((d / "summary.json").read_text(encoding="utf-8")) for d in (self.whole, directory)

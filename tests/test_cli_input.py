@@ -398,7 +398,7 @@ def test_broken_profile_is_refused(
     ("arguments", "text"),
     [
         (["run", "nowhere.toml"], "nowhere.toml: found no such file"),
-        (["run", "."], "unreadable"),
+        (["run", "."], "found the directory of a run"),
         (["run"], "Missing argument"),
         (["runn", "case.toml"], "No such command"),
         (["run", "case.toml", "--reusme"], "No such option"),

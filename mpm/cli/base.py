@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,6 +16,9 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+RunArgument = Annotated[
+    Path, typer.Argument(metavar="DIR", help="the directory of a run, e.g. results/single_zone")
+]
 CaseArgument = Annotated[
     str, typer.Argument(metavar="CASE", help="a case file, or the name of a built-in case")
 ]

@@ -1,42 +1,109 @@
-"""Verbs that compute a case: run."""
+"""Verbs that compute a case: run, resume, watch."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mpm.cli.base import CaseArgument, SetOption, app
+from mpm.cli.base import CaseArgument, RunArgument, SetOption, app
 from mpm.errors import InputError
 from mpm.launcher import rank
 from mpm.screen import screen
 from mpm.settings import parse_settings
+
+if TYPE_CHECKING:
+    from mpm.case import Case
+
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="no progress line and no summary")]
 
 
 @app.command()
 def run(
     case: CaseArgument,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/CASE")
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="where results go (default: results/CASE)"),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="results/NAME instead; auto: results/CASE-001, -002, ..., the next that is free",
+        ),
     ] = None,
     settings: SetOption = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on from the restart state in DIR")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an earlier run in DIR")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="no progress line and no summary")] = False,
+    quiet: QuietOption = False,
 ) -> None:
-    """Run a case."""
+    """Run a case and write its results into a directory.
+
+    \b
+    mpm run single_zone                            a built-in case, into results/single_zone
+    mpm run wide.toml --name auto                  your own, into results/wide-001
+    mpm run wide.toml -o slow --set motion.bed_velocity='8 mm/s'
+    mpirun -n 4 python -m mpm run wide.toml        on four processes
+
+    Ctrl-C stops cleanly; mpm resume DIR goes on.
+    """
     from mpm.case import load_case
+    from mpm.rundirs import AUTO, directory_named, make_numbered
 
-    if resume and overwrite:
-        raise InputError.at("run", "--resume", "--overwrite as well", "one of them", given="")
+    if resume and (overwrite or name == AUTO):
+        other = "--overwrite" if overwrite else f"--name {AUTO}"
+        raise InputError.at("run", "--resume", f"{other} as well", "one of them", given="")
+    if output is not None and name is not None:
+        raise InputError.at("run", "--name", "--output as well", "one of them", given="")
     loaded = load_case(case, parse_settings(settings))
-    directory = output or Path("results") / Path(case).stem
+    directory = output or directory_named(Path(case).stem if name is None else name)
+    if name == AUTO:
+        import mpm.fem  # noqa: F401
+        from mpm.parallel import on_root
 
+        from mpi4py import MPI  # isort: skip  (after fem)
+
+        directory = on_root(MPI.COMM_WORLD, lambda: make_numbered(Path(case).stem))
+    _compute(loaded, directory, resume, overwrite, quiet)
+
+
+@app.command()
+def resume(
+    directory: RunArgument,
+    end: Annotated[
+        str | None, typer.Option(metavar="TIME", help="a later end than that of the case, e.g. '40 s'")
+    ] = None,
+    quiet: QuietOption = False,
+) -> None:
+    """Go on with a run that was stopped, killed or has failed, or that is to run longer.
+
+    \b
+    mpm resume results/wide                        to the end of its case
+    mpm resume results/wide --end '40 s'           further
+
+    The case is the one in DIR/case.toml; nothing else is needed.
+    """
+    from mpm.case import load_case
+    from mpm.rundirs import require_run
+
+    require_run(directory)
+    case = load_case(directory / "case.toml", {} if end is None else {"time.end": end})
+    if end is not None and case.fidelity == "steady":
+        raise InputError.at("resume", "--end", repr(end), "nothing: a steady state has no end", given="")
+    _compute(case, directory, True, False, quiet)
+
+
+def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: bool) -> None:
+    """Run `case` in `directory`, or go on there, and print what has come out."""
     from mpm.nextsteps import how_to_go_on, print_end
     from mpm.reactor import Reactor
+    from mpm.rundirs import can_resume
 
+    if resume and not can_resume(directory, case) and rank() == 0:
+        print(f"{directory}: no restart state yet, so the run begins anew", file=sys.stderr)
     with how_to_go_on(directory):
-        result = Reactor(loaded).run(output=directory, resume=resume, overwrite=overwrite, progress=not quiet)
+        result = Reactor(case).run(output=directory, resume=resume, overwrite=overwrite, progress=not quiet)
     if rank() == 0 and not quiet:
-        print_end(loaded, result.summary, directory, screen())
+        print_end(case, result.summary, directory, screen())

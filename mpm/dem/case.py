@@ -15,9 +15,9 @@ import numpy as np
 import tomli_w
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from mpm.caseio import read_toml
 from mpm.errors import InputError
 from mpm.gases import ideal_gas_density
+from mpm.kinds import POWDER, read_input
 from mpm.units import (
     Density,
     Dimension,
@@ -267,7 +267,7 @@ def load_case(source: Path | str | Mapping[str, Any], overrides: Mapping[str, An
     else:
         path = Path(source)
         name, directory = str(path), path.parent
-        data = read_toml(path)
+        data = read_input(path, POWDER)
     if "directory" in data:
         raise InputError(f"{name}: directory: unknown key")
     for key, value in (overrides or {}).items():

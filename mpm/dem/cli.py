@@ -9,6 +9,7 @@ import typer
 from typer.core import TyperGroup
 
 from mpm.errors import InputError
+from mpm.kinds import DEM_RUN, kind_of_directory, what_it_is
 from mpm.launcher import rank
 from mpm.settings import parse_settings
 
@@ -66,6 +67,8 @@ def run(
     if jobs is not None and jobs < 1:
         raise InputError(f"mpm dem: --jobs: found {jobs}; accepted: a number from 1")
     directory = output or Path("results") / powder.stem
+    if resume and kind_of_directory(directory) is not DEM_RUN:
+        raise InputError.at(directory, "", f"nothing to resume: {what_it_is(directory)}", DEM_RUN.words)
     if rank() == 0 and not quiet:
         for sentence in idle_keys(case):
             typer.echo(f"mpm dem: has no effect: {sentence}", err=True)

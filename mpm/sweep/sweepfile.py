@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import Any
 
 from mpm.case import Case, load_case
-from mpm.caseio import parse_toml, read_source
 from mpm.errors import InputError
 from mpm.files import is_file
+from mpm.kinds import SWEEP, parse_input, read_input_text
 from mpm.sweep.conditions import Condition
 from mpm.sweep.quantities import Range, to_number, unit_as_written
 from mpm.units import LARGEST, describe
@@ -234,8 +234,8 @@ def _idle(mode: str, table: Mapping[str, Any], items: Sequence[Any], axes: Seque
 def read_sweep(source: str | Path) -> Sweep:
     """Parse and check a sweep file and its base case; InputError for everything wrong with either."""
     path = Path(source)
-    text = read_source(path)
-    document = parse_toml(text, path)
+    text = read_input_text(path, SWEEP)
+    document = parse_input(path, text, SWEEP)
     if "sweep" not in document:
         raise InputError.at(path, "sweep", "nothing", "a table [sweep] (is this a case? then: mpm run)")
     table = _take(path, "", document, "sweep", dict, None)
