@@ -1,204 +1,266 @@
-"""Maps of the strip: a field with the layers, ports and zones drawn to scale."""
+"""Maps of the strip: a field of a run with layers, ports and zones drawn to scale, in the unit and colours of `mpm.fieldnames`."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
+from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import AbstractPathEffect, withStroke
+from matplotlib.ticker import ScalarFormatter
 from numpy.typing import NDArray
 
-from mpm.case import Case, Inlet
+from mpm.fieldnames import FieldName, Limits, colour_limits, field_name, field_values
 from mpm.geometry import Grid
 from mpm.labels import literal
-from mpm.results import Run, fed_by
+from mpm.outline import LINE, MM, WIDTH, draw_layers, draw_ports, draw_zones, formula, way
+from mpm.results import Run
+from mpm.streamlines import stream_function, stream_levels
 from mpm.vtu import Snapshot
 
 Floats = NDArray[np.float64]
-
-OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-WIDTH = 9.0
-"""Width of a map without its margins [inch]."""
-DECADES = 4
-"""Range of the logarithmic maps below their maximum."""
-LINE = 8.5
-"""Height of a line of small text [points]."""
-MM = 1e3
+PLAIN = "#d9e3ea"
+"""Colour of a field that is the same everywhere."""
+OUTLINE: list[AbstractPathEffect] = [withStroke(linewidth=1.7, foreground="0.25", alpha=0.6)]
 
 
-def formula(name: str) -> str:
-    """A chemical formula with its numbers as subscripts; other names unchanged."""
-    return re.sub(r"(?<=[A-Za-z)])(\d+)", r"$_{\1}$", literal(name))
+def values_of(run: Run, snapshot: Snapshot, name: str) -> np.ma.MaskedArray:
+    """A field as (rows, columns) in SI units; coverages are masked where there is no reactive surface. Raises InputError (unknown name)."""
+    grid = run.grid
+    found = field_values(snapshot.cell_data, name, run.directory.pvd).reshape(grid.rows, grid.columns)
+    if not field_name(name).porous:
+        return np.ma.masked_array(found)
+    materials = [layer.material for layer in run.case.geometry.layers]
+    reactive = np.array([m is not None and m.surface_to_volume > 0.0 for m in materials])[grid.row_layer]
+    return np.ma.masked_where(np.broadcast_to(~reactive[:, None], found.shape), found)
 
 
-def coverage_figure(run: Run, snapshot: Snapshot, site: str) -> Figure:
-    """Coverage `theta_<site>`: the whole strip, and the moving layer stretched to be read."""
-    label = f"coverage of {formula(site)}, $\\theta$"
-    theta = run.field(snapshot, f"theta_{site}")
-    porous = np.array([layer.material is not None for layer in run.case.geometry.layers])[run.grid.row_layer]
-    shown = np.ma.masked_where(np.broadcast_to(~porous[:, None], theta.shape), theta)
-    return map_figure(run, snapshot, shown, label, "cividis", Normalize(0.0, 1.0), bed=True)
+def limits_of(run: Run, snapshots: Iterable[Snapshot], name: str) -> Limits:
+    """The scale that holds a field of all these snapshots."""
+    ends = [
+        (float(v.min()), float(v.max()))
+        for v in (values_of(run, one, name) for one in snapshots)
+        if v.count()
+    ]
+    if not ends:
+        return Limits(0.0, 0.0, constant=True)
+    return colour_limits(field_name(name), min(low for low, _ in ends), max(high for _, high in ends))
 
 
-def species_figure(run: Run, snapshot: Snapshot, species: str) -> Figure:
-    """Mole fraction `x_<species>` on a logarithmic scale."""
-    values = run.field(snapshot, f"x_{species}")
-    return map_figure(
-        run, snapshot, values, f"mole fraction of {formula(species)}", "viridis", decades(values)
-    )
+def colours(entry: FieldName, limits: Limits) -> tuple[Colormap | str, Normalize]:
+    """Colour map and scale for values in `entry.unit_shown`."""
+    if limits.constant:
+        return ListedColormap([PLAIN]), Normalize(0.0, 1.0)
+    low, high = limits.low / entry.factor, limits.high / entry.factor
+    return entry.colours, LogNorm(low, high, clip=True) if limits.log else Normalize(low, high)
 
 
-def cvd_figure(run: Run, snapshot: Snapshot) -> Figure:
-    """Rate of the parasitic gas-phase reaction per total volume, on a logarithmic scale."""
-    values = run.field(snapshot, "cvd_rate")
-    return map_figure(run, snapshot, values, "CVD rate [mol m$^{-3}$ s$^{-1}$]", "viridis", decades(values))
+def words_of(entry: FieldName, difference: bool = False) -> str:
+    """What a field is called, chemical formulas with subscripts."""
+    return ("difference in " if difference else "") + literal(entry.words).format(formula(entry.subject))
 
 
-def decades(values: Floats) -> LogNorm:
-    top = float(values.max())
-    top = top if top > 0.0 else 1.0
-    return LogNorm(top * 10.0**-DECADES, top, clip=True)
+def in_unit(entry: FieldName, text: str, brackets: str = "{}") -> str:
+    """`text` followed by the unit shown, if there is one."""
+    return f"{text} {brackets.format(entry.unit_shown)}" if entry.unit_shown else text
+
+
+def name_of(run: Run) -> str:
+    """A run in the title of its pictures: what the case calls it, and its directory."""
+    where = run.directory.path.resolve().name
+    return literal(f"{run.case.title} [{where}]" if run.case.title else where)
+
+
+def when(run: Run, snapshot: Snapshot) -> str:
+    """The instant that a picture shows."""
+    return "steady state" if run.case.fidelity == "steady" else f"t = {snapshot.time:.4g} s"
+
+
+class Map:
+    """A picture of one field that can be turned to any instant with `show`: the strip, and for coverages the moving layer again, stretched.
+
+    With `streamlines`, lines of the gas lie over it: contour lines of its stream function, see `mpm.streamlines`.
+    """
+
+    def __init__(self, run: Run, name: str, limits: Limits, streamlines: bool = False):
+        self.run, self.entry, self.limits, self.streamlines = run, field_name(name), limits, streamlines
+        self.stretch = stretch_of(run.grid)
+        self.rows = [slice(0, run.grid.rows)]
+        if self.entry.porous:
+            self.rows += [
+                run.grid.layer_rows(layer.name) for layer in run.case.geometry.layers if layer.moving
+            ]
+        height = run.grid.y[-1] - run.grid.y[0]
+        heights = [height / run.grid.length * WIDTH * self.stretch] + [1.3] * (len(self.rows) - 1)
+        self.figure = Figure(
+            figsize=(WIDTH + 1.6, sum(heights) + 0.9 * len(heights) + 1.2), layout="constrained"
+        )
+        grid = self.figure.add_gridspec(len(heights), 1, height_ratios=heights)
+        self.panels = [self.figure.add_subplot(grid[k, 0]) for k in range(len(heights))]
+        empty = np.zeros((run.grid.rows, run.grid.columns))
+        self.meshes = [
+            draw_strip(self.panels[0], run, empty, self.entry, limits, self.stretch),
+            *(
+                draw_layer(panel, run, rows, empty, self.entry, limits)
+                for panel, rows in zip(self.panels[1:], self.rows[1:], strict=True)
+            ),
+        ]
+        self.panels[-1].set_xlabel(f"x [mm]{way(run.case)}", labelpad=4 if len(heights) > 1 else 14 + LINE)
+        self.panels[0].set_title(
+            drawn_how(run, self.stretch, streamlines), pad=18 + LINE, fontsize=7.5, color="0.35"
+        )
+        self.lines: list[ContourSet | Line2D] = []
+
+    def show(self, snapshot: Snapshot) -> Figure:
+        """The picture of one instant."""
+        run = self.run
+        values = values_of(run, snapshot, self.entry.name) / self.entry.factor
+        for mesh, rows in zip(self.meshes, self.rows, strict=True):
+            mesh.set_array(values[rows])
+        self.figure.suptitle(f"{name_of(run)}, {when(run, snapshot)}", fontsize=10)
+        for line in self.lines:
+            line.remove()
+        self.lines = (
+            draw_streamlines(self.panels, run.grid, snapshot, self.stretch) if self.streamlines else []
+        )
+        if len(self.figure.axes) == len(self.panels):
+            scale_bar(self.figure, self.meshes[0], self.panels, self.entry, self.limits, values)
+        return self.figure
 
 
 def map_figure(
-    run: Run, snapshot: Snapshot, values: Floats, label: str, colours: str, norm: Normalize, bed: bool = False
+    run: Run, snapshot: Snapshot, name: str, limits: Limits | None = None, streamlines: bool = False
 ) -> Figure:
-    """A map of the strip with layers, ports and zones; `bed` adds the moving layer, stretched."""
+    """A field at one instant, on a scale that fits it unless `limits` are given."""
+    return Map(run, name, limits or limits_of(run, [snapshot], name), streamlines).show(snapshot)
+
+
+def stretch_of(grid: Grid) -> int:
+    """By how much heights are stretched, so that the strip is at least 0.7 inch high."""
+    return max(1, int(np.ceil(0.7 / ((grid.y[-1] - grid.y[0]) / grid.length * WIDTH))))
+
+
+def drawn_how(run: Run, stretch: int, streamlines: bool = False) -> str:
+    """What a reader must know to read a map right."""
+    notes = ["to scale" if stretch == 1 else f"height stretched {stretch} times"]
+    if any(0.0 < zone.end < run.case.geometry.length for zone in run.case.geometry.zones):
+        notes.append("dashed: borders of zones")
+    if streamlines:
+        notes.append("lines: streamlines of the gas, the same flow between any two")
+    return "; ".join(notes)
+
+
+def draw_strip(
+    axes: Axes, run: Run, values: Floats, entry: FieldName, limits: Limits, stretch: int
+) -> QuadMesh:
+    """The strip with values [entry.unit_shown], its layers, ports and zones."""
     grid = run.grid
-    height = (grid.y[-1] - grid.y[0]) / grid.length * WIDTH
-    stretch = max(1, int(np.ceil(0.7 / height)))  # at least 0.7 inch high
-    moving = [layer.name for layer in run.case.geometry.layers if layer.moving] if bed else []
-    heights = [height * stretch] + [1.3] * len(moving)
-    figure = Figure(figsize=(WIDTH + 2.4, sum(heights) + 1.15 * len(heights) + 0.35), layout="constrained")
-    axes = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    strip = axes[0]
-    mesh = strip.pcolormesh(
-        grid.x * MM, grid.y * MM, values, cmap=colours, norm=norm, shading="flat", rasterized=True
+    mesh = draw_layer(axes, run, slice(0, grid.rows), values, entry, limits)
+    axes.set_aspect(stretch)
+    axes.set_facecolor("#f2f2f2")
+    draw_layers(axes, run.case, grid, (grid.y[-1] - grid.y[0]) / grid.length * WIDTH * stretch)
+    draw_ports(axes, run.case)
+    axes.set_ylabel("y [mm]")
+    return mesh
+
+
+def draw_layer(
+    axes: Axes, run: Run, rows: slice, values: Floats, entry: FieldName, limits: Limits
+) -> QuadMesh:
+    """Some rows of the strip alone, with the borders of zones."""
+    grid = run.grid
+    cmap, norm = colours(entry, limits)
+    y = grid.y[rows.start : rows.stop + 1] * MM
+    mesh = axes.pcolormesh(
+        grid.x * MM, y, values[rows], cmap=cmap, norm=norm, shading="flat", rasterized=True
     )
-    strip.set_aspect(stretch)
-    scale = "to scale" if stretch == 1 else f"height stretched {stretch} times"
-    title = run.case.title or run.directory.path.resolve().name
-    when = "steady state" if run.case.fidelity == "steady" else f"t = {snapshot.time:.4g} s"
-    strip.set_title(f"{literal(title)}, {when} ({scale})", pad=22 + LINE, fontsize=10)
-    strip.set_facecolor("#f2f2f2")
-    draw_layers(strip, run.case, grid, height * stretch)
-    draw_ports(strip, run.case)
-    draw_zones(strip, run.case)
-    strip.set_ylabel("y [mm]")
-    for name, panel in zip(moving, axes[1:], strict=True):
-        rows = grid.layer_rows(name)
-        y = grid.y[rows.start : rows.stop + 1] * MM
-        panel.pcolormesh(
-            grid.x * MM, y, values[rows], cmap=colours, norm=norm, shading="flat", rasterized=True
-        )
-        draw_zones(panel, run.case)
-        panel.set_ylabel(f"{literal(name)}: y [mm]")
-    for panel in axes:
-        panel.set_xlim(grid.x[0] * MM, grid.x[-1] * MM)
-    axes[-1].set_xlabel(
-        f"x [mm]{way(run.case)}",
-        labelpad=4 if len(moving) else 14 + LINE,  # below the names of the inlets
-    )
-    extend = "min" if isinstance(norm, LogNorm) else "neither"
-    figure.colorbar(
+    draw_zones(axes, run.case)
+    axes.set(xlim=(grid.x[0] * MM, grid.x[-1] * MM), ylim=(y[0], y[-1]))
+    axes.set_ylabel(f"{literal(grid.layer_names[grid.row_layer[rows.start]])}: y [mm]")
+    return mesh
+
+
+def scale_bar(
+    figure: Figure,
+    mesh: QuadMesh,
+    panels: Sequence[Axes],
+    entry: FieldName,
+    limits: Limits,
+    values: Floats,
+    difference: bool = False,
+) -> None:
+    """The colour bar below the panels, or a sentence where the field is constant. Pointed ends say that values lie beyond."""
+    words = words_of(entry, difference)
+    if limits.constant:
+        value = f"{0.5 * (limits.low + limits.high) / entry.factor:.4g}"
+        figure.supxlabel(f"{words}, constant: {in_unit(entry, value)}", fontsize=9)
+        return
+    below, above = values.min() * entry.factor < limits.low, values.max() * entry.factor > limits.high
+    extend = ("both" if above else "min") if below else "max" if above else "neither"
+    bar = figure.colorbar(
         mesh,
-        ax=list(axes),
-        label=label,
-        fraction=0.03,
-        pad=0.01,
-        aspect=12 if len(axes) == 1 else 25,
+        ax=list(panels),
+        label=in_unit(entry, words, "[{}]"),
+        location="bottom",
         extend=extend,
+        shrink=0.6,
+        aspect=45,
+        pad=0.03,
     )
-    return figure
+    if not limits.log:
+        bar.ax.xaxis.set_major_formatter(ScalarFormatter(useOffset=False))
 
 
-def way(case: Case) -> str:
-    """Which way the bed moves, in words; nothing when it does not."""
-    if case.conveying_velocity == 0.0:
-        return ""
-    return f" (the bed moves to the {'right' if case.direction > 0 else 'left'})"
+def draw_streamlines(
+    panels: Sequence[Axes], grid: Grid, snapshot: Snapshot, stretch: float
+) -> list[ContourSet | Line2D]:
+    """Streamlines on every panel; on the first, whose heights are drawn `stretch` times, with the direction of the gas."""
+    psi = stream_function(grid, snapshot.cell_data["velocity"])
+    levels = stream_levels(grid, psi)
+    if not len(levels):
+        return []
+    places = (grid.x * MM, grid.y * MM)
+    lines = [
+        panel.contour(*places, psi, levels, colors="white", linewidths=0.7, linestyles="solid")
+        for panel in panels
+    ]
+    for contours in lines:
+        contours.set_path_effects(OUTLINE)
+    look: dict[str, Any] = {
+        "markersize": 4.5,
+        "color": "white",
+        "markeredgecolor": "0.25",
+        "markeredgewidth": 0.4,
+    }
+    heads = [
+        panels[0].plot(x, y, marker=(3, 0, angle - 90.0), **look)[0]
+        for x, y, angle in arrows(lines[0], grid, snapshot, stretch)
+    ]
+    return [*lines, *heads]
 
 
-def draw_layers(axes: Axes, case: Case, grid: Grid, inches: float) -> None:
-    """Boundaries of the layers, and their names at the right edge, kept apart where layers are thin."""
-    edges = [grid.y[grid.layer_rows(layer.name).stop] * MM for layer in case.geometry.layers]
-    for edge in edges[:-1]:
-        axes.axhline(edge, color="black", linewidth=0.6)
-    starts = [grid.y[0] * MM, *edges[:-1]]
-    middles = [0.5 * (a + b) for a, b in zip(starts, edges, strict=True)]
-    line = LINE / 72.0 * (edges[-1] - starts[0]) / inches  # height of a line of text [mm]
-    for layer, at in zip(case.geometry.layers, spread(middles, line), strict=True):
-        made_of = f" ({layer.material_name.replace('_', ' ')})" if layer.material_name else ""
-        text = layer.name + made_of
-        axes.annotate(
-            literal(text),
-            (1.008, at),
-            xycoords=("axes fraction", "data"),
-            va="center",
-            fontsize=7,
-            annotation_clip=False,
-        )
-
-
-def spread(positions: Sequence[float], distance: float) -> list[float]:
-    """Move sorted positions apart to at least `distance`, each as little as a sweep up and a sweep down allow."""
-    up = list(positions)
-    for i in range(1, len(up)):
-        up[i] = max(up[i], up[i - 1] + distance)
-    down = list(positions)
-    for i in range(len(down) - 2, -1, -1):
-        down[i] = min(down[i], down[i + 1] - distance)
-    return [0.5 * (a + b) for a, b in zip(up, down, strict=True)]
-
-
-def draw_ports(axes: Axes, case: Case) -> None:
-    """Inlets and outlets as thick lines on their wall, with their names outside and the direction of the gas."""
-    species = case.mechanism.species_names
-    fed = {inlet.name: fed_by(inlet, species) for inlet in case.geometry.inlets}
-    inlets, outlets = list(case.geometry.inlets), list(case.geometry.outlets)
-    for side in ("bottom", "top"):
-        on_wall = sorted(
-            (port for port in [*inlets, *outlets] if port.side == side), key=lambda port: port.x0
-        )
-        gaps = [b.x0 - a.x0 for a, b in pairwise(on_wall)]
-        room = min(gaps, default=case.geometry.length) / case.geometry.length * WIDTH
-        longest = max((len(port.name) for port in on_wall), default=0)
-        crowded = room < 0.065 * (
-            3 + longest
-        )  # inches that a name takes; else every second goes one line further out
-        for index, port in enumerate(on_wall):
-            if isinstance(port, Inlet):
-                colour = OKABE_ITO[species.index(fed[port.name][0]) % 6] if fed[port.name] else "#777777"
-            else:
-                colour = "black"
-            upwards = (side == "bottom") == isinstance(port, Inlet)
-            text = ("\u2191 " if upwards else "\u2193 ") + port.name
-            draw_port(axes, text, port.x0, port.x1, side, colour, line=index % 2 if crowded else 0)
-
-
-def draw_port(axes: Axes, text: str, x0: float, x1: float, side: str, colour: str, line: int) -> None:
-    """One port from x0 to x1 [m]; its name stands `line` lines further out."""
-    at, way = (0.0, -1) if side == "bottom" else (1.0, 1)
-    transform = axes.get_xaxis_transform()
-    axes.plot(
-        [x0 * MM, x1 * MM], [at, at], color=colour, linewidth=5, solid_capstyle="butt",
-        transform=transform, clip_on=False, gid="port", zorder=5,
-    )  # fmt: skip
-    offset = (5 if way > 0 else 17) + line * LINE  # at the bottom below the tick labels
-    axes.annotate(
-        literal(text), (0.5 * (x0 + x1) * MM, at), xycoords=transform, xytext=(0, way * offset),
-        textcoords="offset points", ha="center", va="bottom" if way > 0 else "top", fontsize=7.5, color=colour,
-    )  # fmt: skip
-
-
-def draw_zones(axes: Axes, case: Case) -> None:
-    """Boundaries between zones."""
-    for zone in case.geometry.zones:
-        for x in (zone.start, zone.end):
-            if 0.0 < x < case.geometry.length:
-                axes.axvline(x * MM, color="white", linewidth=1.6)
-                axes.axvline(x * MM, color="black", linewidth=0.8, linestyle=(0, (4, 3)))
+def arrows(
+    lines: ContourSet, grid: Grid, snapshot: Snapshot, stretch: float
+) -> list[tuple[float, float, float]]:
+    """Place [mm] and direction on the page [deg] of an arrow or more on every streamline of some length."""
+    spacing = 0.25 * grid.length * MM
+    uv = snapshot.cell_data["velocity"].astype(float).reshape(grid.rows, grid.columns, -1)
+    found = []
+    for path in (path for level in lines.allsegs for path in level):
+        steps = np.hypot(np.diff(path[:, 0]), stretch * np.diff(path[:, 1]))
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+        count = int(along[-1] / spacing + 0.7)
+        for place in along[-1] * (np.arange(count) + 0.5) / max(count, 1):
+            k = min(int(np.searchsorted(along, place)), len(path) - 1)
+            (x, y), (dx, dy) = path[k], path[k] - path[max(k - 1, 0)]
+            i = min(int(np.searchsorted(grid.y * MM, y, side="right")) - 1, grid.rows - 1)
+            j = min(int(np.searchsorted(grid.x * MM, x, side="right")) - 1, grid.columns - 1)
+            sign = 1.0 if uv[i, j, 0] * dx + uv[i, j, 1] * dy >= 0.0 else -1.0
+            found.append((float(x), float(y), float(np.degrees(np.arctan2(sign * dy * stretch, sign * dx)))))
+    return found

@@ -15,7 +15,7 @@ from mpm.geometry import Grid
 Floats = NDArray[np.float64]
 
 
-def stream_function(grid: Grid, velocity: NDArray[np.floating]) -> Floats:
+def stream_function(grid: Grid, velocity: NDArray[np.generic]) -> Floats:
     """psi [m2/s] at the corners of the cells, (rows + 1, columns + 1) from the bottom left, where it is 0.
 
         u = d psi / dy,   v = -d psi / dx

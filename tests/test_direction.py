@@ -9,10 +9,10 @@ import pytest
 
 from mpm.bed import Bed
 from mpm.case import Case
+from mpm.curves import exits
 from mpm.geometry import Grid
-from mpm.maps import way
+from mpm.outline import way
 from mpm.parallel import on_root
-from mpm.pictures import exits
 from mpm.reactor import Reactor
 from mpm.results import load_run
 from mpm.schedule import Schedule

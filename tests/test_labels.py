@@ -15,8 +15,8 @@ from mpm.case import Case, load_case
 from mpm.errors import InputError
 from mpm.files import file_name
 from mpm.labels import literal, xml_attribute
-from mpm.maps import formula
 from mpm.mesh import read_msh, write_msh
+from mpm.outline import formula
 from mpm.output import RunDirectory
 from mpm.vtu import encode_pvd, encode_vtu, grid_points, grid_quads, read_vtu
 

@@ -1,6 +1,7 @@
 """Pictures show the data that the run's directory holds, in the right place and unit."""
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -9,19 +10,24 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
+from matplotlib.colors import LogNorm, to_hex
+from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from mpm.case import Case, load_case
+from mpm.curves import exit_profile_figure, history_figure, outlets_figure, profile_steps
 from mpm.errors import InputError
 from mpm.files import file_name
 from mpm.geometry import Grid
-from mpm.maps import WIDTH, coverage_figure, cvd_figure, formula, species_figure, spread
+from mpm.maps import PLAIN, map_figure
+from mpm.outline import WIDTH, formula, spread
 from mpm.output import RunDirectory
-from mpm.pictures import Fields, exit_profile_figure, figures, history_figure, outlets_figure, plot_run
+from mpm.pictures import Fields, draw_field, figures, plot_run
 from mpm.results import Run, dosing_inlets, fed_species, load_run, sites_made_by
 
 SITE = "OAl(CH3)2"
+COVERAGE = f"theta_{SITE}"
 TIMES = np.linspace(0.0, 2.0, 9)
 
 
@@ -47,10 +53,14 @@ def write_run(path: Path, case: Case, times: np.ndarray = TIMES) -> Run:
         data: dict[str, np.ndarray] = {f"theta_{SITE}": theta(grid, t), "theta_OH": 1.0 - theta(grid, t)}
         data |= {f"x_{name}": np.exp(-x / 0.01) * 1e-4 for name in fed_species(case)}
         data["cvd_rate"] = 1e-3 * np.exp(-((y / 1e-3) ** 2))
-        directory.write_fields(float(t), grid, {name: values.ravel() for name, values in data.items()})
+        data["pressure"] = 45.0 + 0.0 * y
+        gas = {"velocity": np.full((grid.cells, 2), (-0.03, 0.0))}
+        stored = {name: values.ravel() for name, values in data.items()}
+        directory.write_fields(float(t), grid, {**stored, **gas})
         row: dict[str, float | None] = {"time": float(t), "balance.TMA": -1e-13 * t, "balance.sites": 0.0}
-        for inlet in dosing_inlets(case):
-            row |= {f"titration.{inlet.name}.box_mean": t / 4, f"titration.{inlet.name}.exit_mean": t / 2}
+        for number, inlet in enumerate(dosing_inlets(case)):
+            row |= {f"titration.{inlet.name}.box_mean": t / (4 + number)}
+            row |= {f"titration.{inlet.name}.exit_mean": t / 2}
         for number, outlet in enumerate(case.geometry.outlets):
             row |= {
                 f"outlets.{outlet.name}.x.{s}": 1e-6 * t * (number + 1) for s in case.mechanism.species_names
@@ -86,7 +96,7 @@ def texts(axes: Axes) -> list[str]:
 
 def test_coverage_map_is_to_scale_and_in_place(zone: Run) -> None:
     """Fails when rows or columns are swapped, gas layers are coloured, units are not mm, or the strip is distorted."""
-    figure = coverage_figure(zone, zone.snapshot(), SITE)
+    figure = map_figure(zone, zone.snapshot(), COVERAGE)
     strip, bed = figure.axes[:2]
     (mesh,) = meshes(strip)
     values = drawn(mesh)
@@ -105,7 +115,7 @@ def test_coverage_map_is_to_scale_and_in_place(zone: Run) -> None:
 
 def test_strip_takes_its_share_of_the_page(zone: Run) -> None:
     """Fails when the drawn strip is not 22.29/139.7 as high as wide, or is squeezed by labels to less than 6 inches."""
-    figure = coverage_figure(zone, zone.snapshot(), SITE)
+    figure = map_figure(zone, zone.snapshot(), COVERAGE)
     figure.draw_without_rendering()
     box = figure.axes[0].bbox
     assert box.height / box.width == pytest.approx(22.29 / 139.7, rel=0.01)
@@ -114,7 +124,7 @@ def test_strip_takes_its_share_of_the_page(zone: Run) -> None:
 
 def test_layers_ports_and_zones_are_drawn(cycle: Run) -> None:
     """Fails when a port is missing or off its place, a layer has no name, or the zones' boundary is not drawn."""
-    strip = coverage_figure(cycle, cycle.snapshot(), SITE).axes[0]
+    strip = map_figure(cycle, cycle.snapshot(), COVERAGE).axes[0]
     geometry = cycle.case.geometry
     ports = {
         (round(x[0], 6), round(x[1], 6), y[0])
@@ -139,14 +149,14 @@ def test_layers_ports_and_zones_are_drawn(cycle: Run) -> None:
 def test_precursor_map_spans_four_decades(cycle: Run) -> None:
     """Fails when another field is drawn, the scale is linear, or the colour range does not follow the data."""
     for name in ("TMA", "H2O"):
-        figure = species_figure(cycle, cycle.snapshot(), name)
+        figure = map_figure(cycle, cycle.snapshot(), f"x_{name}")
         (mesh,) = meshes(figure.axes[0])
         values = drawn(mesh)
         assert np.array_equal(values, cycle.field(cycle.snapshot(), f"x_{name}"))
         low, high = mesh.get_clim()
         assert high == values.max() and high / low == pytest.approx(1e4)
-        assert formula(name) in figure.axes[1].get_ylabel()
-    (mesh,) = meshes(cvd_figure(cycle, cycle.snapshot()).axes[0])
+        assert figure.axes[1].get_xlabel() == f"mole fraction of {formula(name)}"
+    (mesh,) = meshes(map_figure(cycle, cycle.snapshot(), "cvd_rate").axes[0])
     assert drawn(mesh).max() == cycle.field(cycle.snapshot(), "cvd_rate").max()
 
 
@@ -154,9 +164,58 @@ def test_an_all_zero_field_can_be_drawn(zone: Run) -> None:
     """Fails when a species that has not arrived yet breaks the logarithmic scale."""
     snapshot = zone.snapshot()
     snapshot.cell_data["x_TMA"] = np.zeros(zone.grid.cells)
-    figure = species_figure(zone, snapshot, "TMA")
+    figure = map_figure(zone, snapshot, "x_TMA")
     figure.draw_without_rendering()
     assert drawn(meshes(figure.axes[0])[0]).max() == 0.0
+
+
+def test_a_constant_has_no_colour_scale(zone: Run) -> None:
+    """Fails when a field of one value is drawn in the colours of a range, or the value or its unit is not said."""
+    figure = map_figure(zone, zone.snapshot(), "pressure")
+    assert len(figure.axes) == 1
+    (mesh,) = meshes(figure.axes[0])
+    assert mesh.get_cmap()(0.0) == mesh.get_cmap()(1.0) and to_hex(mesh.get_cmap()(0.0)) == PLAIN
+    assert figure.get_supxlabel() == "pressure of the gas above the outlets, constant: 45 Pa"
+
+
+def test_streamlines_point_the_way_of_the_gas(zone: Run) -> None:
+    """Fails when lines are no contours of the stream function (here level ones), an arrow points upstream, or nothing explains them."""
+    figure = map_figure(zone, zone.snapshot(), "velocity_x", streamlines=True)
+    strip = figure.axes[0]
+    (lines,) = [child for child in strip.get_children() if isinstance(child, ContourSet)]
+    paths = [path for level in lines.allsegs for path in level]
+    assert len(paths) > 20 and all(np.ptp(path[:, 1]) < 1e-9 for path in paths)
+    heads = [line.get_marker() for line in strip.get_lines() if isinstance(line.get_marker(), tuple)]
+    assert len(heads) > 20 and {(angle + 90.0) % 360.0 for *_, angle in heads} == {180.0}
+    assert "lines: streamlines of the gas" in strip.get_title()
+
+
+def test_a_steady_picture_speaks_of_no_time(tmp_path: Path) -> None:
+    """Fails when "0 s" stands in a picture of a steady state, or a legend explains a single curve."""
+    changes = {"geometry.cell_width": "4 mm", "fidelity": "steady"}
+    run = write_run(tmp_path / "x", load_case("single_cycle", changes), TIMES[:1])
+    for picture, figure in figures(run):
+        words = [figure.get_suptitle(), picture.words, *(axes.get_title() for axes in figure.axes)]
+        assert not figure.legends and "steady state" in " ".join(words[0].split())
+        assert not [line for line in words if re.search(r"\bt = |\d s\b", line)]
+
+
+def test_any_field_at_any_time_in_any_range(cycle: Run) -> None:
+    """Fails when another time than the nearest is drawn, or the chosen range is not that of the colours in the unit of their label."""
+    figure = draw_field(cycle, "theta_OH", time=0.6)
+    (mesh,) = meshes(figure.axes[0])
+    assert np.array_equal(
+        drawn(mesh).compressed()[:5], (1.0 - theta(cycle.grid, 0.5))[drawn(mesh).mask == 0][:5]
+    )
+    assert figure.get_suptitle().endswith("t = 0.5 s")
+    figure = draw_field(cycle, "velocity", clim=(0.0, 5.0))
+    (mesh,) = meshes(figure.axes[0])
+    assert mesh.get_clim() == (0.0, 5.0) and np.allclose(drawn(mesh), 3.0)
+    figure = draw_field(cycle, "x_TMA", clim=(1e-6, 1e-4))
+    (mesh,) = meshes(figure.axes[0])
+    assert isinstance(mesh.norm, LogNorm) and mesh.get_clim() == (1e-6, 1e-4)
+    with pytest.raises(InputError, match=r"found 'theta_HO'.*did you mean theta_OH"):
+        draw_field(cycle, "theta_HO")
 
 
 def by_label(figure: Figure, panel: int) -> dict[str, np.ndarray]:
@@ -166,15 +225,30 @@ def by_label(figure: Figure, panel: int) -> dict[str, np.ndarray]:
 def test_history_curves(cycle: Run) -> None:
     """Fails when a curve is missing, is another column's, or a balance error loses its magnitude."""
     figure = history_figure(cycle)
-    titration, balance = by_label(figure, 0), by_label(figure, 1)
-    assert set(titration) == {
-        f"{i.name}: {kind} mean" for i in dosing_inlets(cycle.case) for kind in ("box", "exit")
-    }
-    for inlet in dosing_inlets(cycle.case):
-        assert np.array_equal(titration[f"{inlet.name}: box mean"], TIMES / 4)
-        assert np.array_equal(titration[f"{inlet.name}: exit mean"], TIMES / 2)
-    assert np.allclose(balance["TMA"][1:], 1e-13 * TIMES[1:]) and np.isnan(balance["sites (zero)"]).all()
-    assert figure.axes[1].get_yscale() == "log" and figure.axes[1].get_xlabel() == "time [s]"
+    for panel, inlet in enumerate(dosing_inlets(cycle.case)):
+        curves = by_label(figure, panel)
+        assert np.array_equal(curves.pop("in the bed before the inlet, mean"), TIMES / (4 + panel))
+        assert np.array_equal(curves.pop("where solids leave the zone, mean"), TIMES / 2)
+        assert not curves and figure.axes[panel].get_xlabel() == "time [s]"
+        made, species = (formula(SITE), "TMA") if inlet.name == "tma" else ("OH", formula("H2O"))
+        assert figure.axes[panel].get_title() == f"{made}, made by {species} from inlet {inlet.name}"
+    balance = by_label(figure, 2)
+    assert np.allclose(balance.pop("TMA")[1:], 1e-13 * TIMES[1:]) and not balance
+    assert figure.axes[2].get_yscale() == "log" and figure.axes[2].get_xlabel() == "time [s]"
+    assert figure.get_suptitle().startswith("Single cycle of TMA and water [cycle]: coverage")
+    assert not_drawn(figure) == "Not drawn: balance errors that are zero throughout: surface sites"
+
+
+def not_drawn(figure: Figure) -> str:
+    """The note at the foot of a picture."""
+    return figure.get_supxlabel()
+
+
+def test_nothing_but_zero_is_no_picture(zone: Run) -> None:
+    """Fails when a run in which nothing is coated and nothing is out of balance gets empty axes for a history."""
+    file = zone.directory.path / "history.csv"
+    file.write_text("time,balance.TMA,balance.sites,outlets.zone1.x.TMA\n0.0,0.0,0.0,\n1.0,0.0,0.0,0.0\n")
+    assert pictures_of(zone.directory.path)[0] == ALL - {"history", "outlets"}
 
 
 def test_outlet_curves(cycle: Run) -> None:
@@ -188,9 +262,22 @@ def test_outlet_curves(cycle: Run) -> None:
             assert np.allclose(values[1:], 1e-6 * TIMES[1:] * (panel + 1))
 
 
+def test_an_outlet_legend_names_drawn_curves_alone(cycle: Run) -> None:
+    """Fails when a legend has an entry without a curve, or a curve that no logarithmic axis can show is not named."""
+    columns = dict(cycle.history)
+    columns["outlets.zone1.x.TMA"] = np.zeros(len(TIMES))
+    columns["outlets.zone2.x.TMA"] = np.full(len(TIMES), 1e-30)
+    figure = outlets_figure(replace(cycle, history=columns))
+    (legend,) = figure.legends
+    assert {text.get_text() for text in legend.get_texts()} == {
+        formula(name) for name in cycle.case.mechanism.species_names if name != "TMA"
+    }
+    assert not_drawn(figure) == "Not drawn: zero throughout in zone1: TMA; below 4e-12 in zone2: TMA"
+
+
 def test_exit_profile_is_the_last_column_of_the_zone(cycle: Run) -> None:
     """Fails when another column, row order, time or site is drawn."""
-    figure = exit_profile_figure(cycle, Fields(cycle))
+    figure = exit_profile_figure(cycle, [cycle.snapshot(k) for k in profile_steps(cycle)])
     grid = cycle.grid
     rows = grid.layer_rows("bed")
     y = 0.5 * (grid.y[1:] + grid.y[:-1])[rows] * 1e3
@@ -207,7 +294,8 @@ def test_exit_profile_is_the_last_column_of_the_zone(cycle: Run) -> None:
 def test_plot_run_writes_every_picture(cycle: Run) -> None:
     """Fails when a picture is missing, or nothing but background is in it."""
     paths = plot_run(cycle.directory.path)
-    names = ["coverage", "map_TMA", "map_H2O", "map_cvd", "exit_profile", "history", "outlets"]
+    names = ["coverage", "map_TMA", "map_H2O", "map_cvd", "speed", "pressure"]
+    names += ["exit_profile", "history", "outlets"]
     assert [path.stem for path in paths] == names and {path.parent.name for path in paths} == {"plots"}
     for path in paths:
         pixels = (imread(path)[..., :3] * 255).astype(int)
@@ -218,16 +306,18 @@ def test_run_without_history_or_fields(tmp_path: Path) -> None:
     """A run stopped early, or a steady one: fails when what is there is not drawn or what is not there stops it."""
     case = load_case("single_zone", {"geometry.cell_width": "2 mm"})
     one = write_run(tmp_path / "one", case, TIMES[-1:])
-    assert [name for name, _ in figures(one)] == ["coverage", "map_TMA", "map_cvd", "exit_profile"]
+    assert [picture.name for picture, _ in figures(one)] == [
+        *("coverage", "map_TMA", "map_cvd", "speed", "pressure", "exit_profile")
+    ]
     none = write_run(tmp_path / "none", case, TIMES[:0])
-    assert plot_run(none.directory.path) == []
+    assert plot_run(none.directory.path) == {}
 
 
 def test_long_strip_is_stretched_and_says_so(tmp_path: Path) -> None:
     """Four cycles are 1117.6 mm by 22 mm: fails when the strip is drawn as an unreadable line, or names overlap."""
     changes = {"geometry.cell_width": "5 mm", "geometry.length": "1117.6 mm"}
-    figure = coverage_figure(
-        run := write_run(tmp_path / "long", load_case("single_zone", changes)), run.snapshot(), SITE
+    figure = map_figure(
+        run := write_run(tmp_path / "long", load_case("single_zone", changes)), run.snapshot(), COVERAGE
     )
     figure.draw_without_rendering()
     strip = figure.axes[0]
@@ -262,16 +352,16 @@ def test_not_a_run_is_bad_input(tmp_path: Path) -> None:
 def test_missing_field_names_those_that_exist(zone: Run) -> None:
     """Fails when the message does not say what could have been asked for."""
     with pytest.raises(InputError, match=r"x_CO.*x_TMA"):
-        species_figure(zone, zone.snapshot(), "CO")
+        map_figure(zone, zone.snapshot(), "x_CO")
 
 
 def pictures_of(path: Path) -> tuple[set[str], str]:
     """Names of the pictures that can be drawn, and everything that was said."""
     said: list[str] = []
-    return {name for name, _ in figures(load_run(path, said.append), said.append)}, "\n".join(said)
+    return {picture.name for picture, _ in figures(load_run(path, said.append), said.append)}, "\n".join(said)
 
 
-ALL = {"coverage", "map_TMA", "map_cvd", "exit_profile", "history", "outlets"}
+ALL = {"coverage", "map_TMA", "map_cvd", "speed", "pressure", "exit_profile", "history", "outlets"}
 
 
 @pytest.mark.parametrize(
@@ -321,7 +411,7 @@ def test_a_run_of_which_nothing_is_left_is_one_line(zone: Run) -> None:
 
 def figure_times(run: Run) -> set[str]:
     """Times that the exit profile shows."""
-    figure = exit_profile_figure(run, Fields(run))
+    figure = exit_profile_figure(run, list(Fields(run).at(profile_steps(run))))
     return {str(line.get_label()) for line in figure.axes[0].get_lines()}
 
 
@@ -367,11 +457,13 @@ def test_what_is_no_run_is_refused_by_what_it_is(tmp_path: Path, what: str) -> N
 def test_names_are_no_formulas_and_no_paths(tmp_path: Path) -> None:
     """Fails when a dollar sign in a title or a name begins a formula of matplotlib, or a name with a slash leaves plots/."""
     changes = {"geometry.cell_width": "2 mm", "title": r"5 $ and \frac $ more"}
-    figure = coverage_figure(
-        run := write_run(tmp_path / "x", load_case("single_zone", changes), TIMES[:2]), run.snapshot(), SITE
+    figure = map_figure(
+        run := write_run(tmp_path / "x", load_case("single_zone", changes), TIMES[:2]),
+        run.snapshot(),
+        COVERAGE,
     )
     figure.draw_without_rendering()
-    assert r"5 \$ and" in figure.axes[0].get_title()
+    assert r"5 \$ and" in figure.get_suptitle()
     assert (
         file_name("map_../a b") == "map_..%2Fa%20b"
         and file_name("coverage_OAl(CH3)2") == "coverage_OAl(CH3)2"

@@ -57,7 +57,17 @@ WITHOUT_NUMBERS = (
     *("sweep", "dem", "cases"),
     *("cli", "launcher.py", "settings.py", "screen.py", "tables.py", "caveats.py", "idle.py"),
     *("quantities.py", "keys.py", "page"),
-    *("results.py", "pictures.py", "maps.py", "labels.py", "optimise.py"),
+    *(
+        "results.py",
+        "pictures.py",
+        "maps.py",
+        "outline.py",
+        "curves.py",
+        "streamlines.py",
+        "fieldnames.py",
+        "labels.py",
+        "optimise.py",
+    ),
     *("compare.py",),
 )
 """Parts of the package that change no number of a point: sweeps, particles, the command line, warnings, pictures."""

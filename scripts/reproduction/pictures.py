@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from mpm.maps import OKABE_ITO, draw_ports, draw_zones, formula
+from mpm.outline import OKABE_ITO, draw_ports, draw_zones, formula
 from mpm.pictures import STYLE
 from mpm.results import Run
 from reproduction import cycle_rows, outlet_rows, vibration_rows, zone_rows

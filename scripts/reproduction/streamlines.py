@@ -17,8 +17,8 @@ from PIL import Image
 
 from mpm.case import Case
 from mpm.geometry import Grid
-from mpm.maps import draw_ports
 from mpm.motion import BedMotion
+from mpm.outline import draw_ports
 from mpm.pictures import STYLE
 from reproduction.flow_rows import GAMMAS, resolved
 from reproduction.flows import BOTTOM, LEFT, RIGHT, TOP, at_rest, cycle, porosities
