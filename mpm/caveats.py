@@ -40,14 +40,14 @@ def profile_caveats(case: Case) -> list[str]:
     name = Path(motion.profile).name
     if motion.gamma == 0.0 and motion.profile not in PRESETS:
         return [
-            f"motion.profile, {name}, has no effect: without vibration (gamma = 0) the bed moves at bed_velocity"
+            f"motion.profile: the bed does not move as {name} says but steadily at bed_velocity, for nothing vibrates (gamma = 0)"
         ]
     if motion.table is None:
         return []
     found = []
     if "bed_velocity" in motion.model_fields_set:
         found.append(
-            f"motion.bed_velocity, {motion.bed_velocity * 100:.3g} cm/s, has no effect: the bed moves as {name} says, "
+            f"motion.bed_velocity: the bed does not move at {motion.bed_velocity * 100:.3g} cm/s but as {name} says, "
             f"{motion.mean_velocity * 100:.3g} cm/s in the mean"
         )
     made = motion.table.conditions

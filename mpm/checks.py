@@ -15,7 +15,7 @@ from mpm.caveats import (
     profile_caveats,
     steady_caveats,
 )
-from mpm.chemistry import inlet_concentrations
+from mpm.chemistry import inlet_concentrations, mole_fractions
 from mpm.dem.relations import (
     mean_free_path,
     minimum_fluidisation_velocity,
@@ -25,9 +25,11 @@ from mpm.dem.relations import (
 )
 from mpm.geometry import Grid
 from mpm.idle import idle_keys
+from mpm.keys import values
 from mpm.layout import Inlet, Layer
 from mpm.materials import Material
 from mpm.motion import Vibration
+from mpm.notes import notes, per_minute, sites_per_square_nanometre, standard_flow
 from mpm.saturation import coverage_met, slowest_turnover, uptake
 from mpm.schedule import Schedule
 
@@ -36,6 +38,9 @@ SMEARED = 0.1
 by 0.002 (docs/open_question.md)."""
 CONTINUUM = 0.01
 """Knudsen number of the pores from which slip counts: it adds 8 Kn to the permeability (Klinkenberg 1941), 8 % here."""
+FEW = 10.0
+"""Particles across a layer below which averages over its pores mean little: near a wall the porosity swings for about five diameters
+(Benenati and Brosilow 1962)."""
 DILUTE = 0.02
 """Mass fraction above which a feed is no longer dilute: the gas keeps the density and viscosity of its carrier."""
 
@@ -46,6 +51,7 @@ def check_case(case: Case) -> dict[str, Any]:
     report: dict[str, Any] = {
         "title": case.title,
         "fidelity": case.fidelity,
+        "strip": _strip(case),
         "mesh": {
             "columns": grid.columns,
             "rows": grid.rows,
@@ -55,6 +61,7 @@ def check_case(case: Case) -> dict[str, Any]:
         },
         "run": {
             "steps": eng.expected_steps(case),
+            "step": None if case.fidelity == "steady" else Schedule.from_case(case).dt,
             "peak_memory_bytes": eng.expected_memory(case, grid.cells),
             "flow_courant": eng.flow_courant(case, grid),
             "numerical_diffusion": eng.numerical_diffusion(case, grid),
@@ -72,6 +79,11 @@ def check_case(case: Case) -> dict[str, Any]:
         "pores": {
             layer.name: _pores(case, layer.material) for layer in case.geometry.layers if layer.material
         },
+        "sites_per_nm2": {
+            layer.name: sites_per_square_nanometre(layer.material.site_density)
+            for layer in case.geometry.layers
+            if layer.material
+        },
         "motion": _motion(case),
         "inlets": {inlet.name: _inlet(case, inlet) for inlet in case.geometry.inlets},
         "reactions": [str(r) for r in (*case.mechanism.surface_reactions, *case.mechanism.gas_reactions)],
@@ -79,6 +91,8 @@ def check_case(case: Case) -> dict[str, Any]:
     bed = case.geometry.moving_layer
     if bed is not None:
         report["bed"] = _bed(case, bed)
+    report["origins"] = {value.name: value.origin for value in values(case)}
+    report["notes"] = notes(case)
     report["without_effect"] = idle_keys(case)
     report["warnings"] = warnings(case, report)  # before anything is dropped that they speak of
     return {key: _finite(entry) for key, entry in report.items()}
@@ -92,6 +106,19 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def _strip(case: Case) -> dict[str, Any]:
+    """What the gas and the solids meet at the ends."""
+    geometry = case.geometry
+    return {
+        "length": geometry.length,
+        "height": sum(layer.height for layer in geometry.layers),
+        "ends": "periodic" if geometry.periodic else "walls",
+        "bed_inflow": geometry.bed_inflow,
+        "bed_direction": "right" if case.direction > 0 else "left",
+        "moving_layer": geometry.moving_layer.name if geometry.moving_layer else None,
+    }
 
 
 def _free_path(case: Case) -> float:
@@ -108,6 +135,7 @@ def _motion(case: Case) -> dict[str, float | str | None]:
     vibration = Vibration.from_motion(case.motion)
     return {
         "gamma": case.motion.gamma,
+        "vibration_enters": case.follows_cycle and case.motion.gamma > 0.0,
         "frequency": case.motion.frequency,
         "amplitude_x": vibration.ax,
         "amplitude_y": vibration.ay,
@@ -124,9 +152,13 @@ def _motion(case: Case) -> dict[str, float | str | None]:
 
 def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     gas, bed = case.gas, case.geometry.moving_layer
+    standard = standard_flow(inlet.velocity * inlet.width, gas.temperature, gas.pressure)
     numbers: dict[str, Any] = {
         "velocity": inlet.velocity,
         "flow": inlet.velocity * inlet.width,
+        "standard_flow": standard,
+        "sccm_per_metre": per_minute(standard),
+        "mole_fractions": mole_fractions(case.mechanism, gas.molar_mass, inlet.mass_fractions),
         "Re": eng.reynolds(gas.density, inlet.velocity, inlet.width, gas.viscosity),
         "concentrations": inlet_concentrations(case.mechanism, gas, inlet.mass_fractions),
     }
@@ -209,9 +241,17 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     ratio = bed.get("gas_over_minimum_fluidisation", 0.0)
     if ratio > 1.0:
         found.append(
-            f"gas rises through the bed at {bed['gas_velocity'] * 100:.3g} cm/s, {ratio:.2g} times minimum "
-            "fluidisation: the bed would not stay a porous solid"
+            f"gas rises through the bed at {bed['gas_velocity'] * 100:.3g} cm/s, {ratio:.2g} times minimum fluidisation "
+            f"({bed['minimum_fluidisation_ergun'] * 100:.3g} cm/s, Ergun): a real bed would expand or bubble, the model keeps it packed; "
+            f"{1.0 / ratio:.2g} times the flow of the inlets below would leave it at rest"
         )
+    for layer in case.geometry.layers:
+        size = layer.material.particle_diameter if layer.material is not None else None
+        if size is not None and layer.height < FEW * size:
+            found.append(
+                f"layer {layer.name} is {layer.height * 1e3:.3g} mm high, {layer.height / size:.2g} particles of {size * 1e6:.3g} um: "
+                f"below {FEW:g} it is no continuum, and porosity and permeability are not those of a deep bed"
+            )
     for inlet in case.geometry.inlets:
         feed = sum(inlet.mass_fractions.values())
         if feed > DILUTE:
@@ -244,6 +284,6 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     if case.fidelity == "averaged" and bed and slide > 1.0 + 1e-6:
         found.append(
             f"the bed moves {slide:.2g} columns in a step, which leaves stripes of single columns in the coverage: lower time.step "
-            f"to {math.ceil(1e4 * report['mesh']['column_width'] / speed) / 10:g} ms"
+            f"to {math.ceil(1e4 * report['mesh']['column_width'] / speed) / 10:g} ms, unless means are all that is wanted"
         )
     return found

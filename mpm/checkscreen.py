@@ -1,140 +1,339 @@
-"""What `mpm check` prints: the case and its numbers."""
+"""What `mpm check` prints: a sketch of the strip, then the case and its numbers in groups, each value with what it owes to a default."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.text import Text
 
 from mpm.case import Case
 from mpm.errors import printable
-from mpm.screen import Listing
+from mpm.keys import Value, values
+from mpm.layout import Inlet
+from mpm.screen import Listing, Sheet, number, say, together
+from mpm.sketch import pen_for, sketch
+from mpm.tables import print_warnings
+
+PAGE = 80
+"""Width of the sketch where there is no edge to go by."""
+MARKS = (
+    "not typed in the case but taken from (default) the program, (built-in) its materials and mechanisms, (base) the shared geometry, "
+    "or (worked out) from other values; mpm explain KEY says more, mpm check CASE --full lists all"
+)
+
+
+class Marked:
+    """The values of a case as people read them, marked where nobody typed them."""
+
+    def __init__(self, case: Case):
+        self.values: dict[str, Value] = {value.name: value for value in values(case)}
+
+    def text(self, name: str) -> str | None:
+        """`3.5 cm/s (default)` of a dotted key; None where the case has no such value."""
+        value = self.values.get(name)
+        return None if value is None else _text(value) + self.mark(name)
+
+    def mark(self, name: str) -> str:
+        """` (default)`, ` (built-in)`, ` (base)`, ` (worked out)`, or nothing behind what was typed."""
+        origin = self.values[name].origin if name in self.values else "typed"
+        return "" if origin == "typed" else f" {together(f'({origin})')}"
+
+
+def _text(value: Value) -> str:
+    """A value as people read it; a ratio that has been worked out with six digits."""
+    if not value.key.unit and value.origin == "worked out":
+        with suppress(ValueError):
+            return number(float(value.text), digits=6)
+    return together(value.text)
 
 
 def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
-    """Print the case and its numbers as tables."""
-    mesh, run = report["mesh"], report["run"]
-    title = Text(printable(case.title) or "case", style="bold")
-    console.print(title.append(f": {case.fidelity}, to {case.time.end:g} s", style="not bold"))
-    console.print(
-        f"{mesh['cells']:,} cells ({mesh['columns']} columns of {mesh['column_width'] * 1e3:.3g} mm, {mesh['rows']} rows), "
-        f"{run['steps']:,} steps, about {run['peak_memory_bytes'] / 1e9:.1f} GB, CFL {run['flow_courant']:.2g}"
-    )
-    for listing in (_layer_table(case), _port_table(case, report), _number_table(case, report)):
-        listing.print(console)
-    for reaction in report["reactions"]:
-        console.print(printable(reaction))
-    for sentence in report["without_effect"]:
-        console.print(Text("has no effect: ", style="yellow").append(printable(sentence), style="default"))
-    for warning in report["warnings"]:
-        console.print(Text("warning:", style="yellow").append(f" {printable(warning)}", style="default"))
+    """Print the case, its numbers, what has no effect and what is questionable."""
+    marked = Marked(case)
+    say(console, printable(case.title) or "case", style="bold")
+    say(console, _what(case, report) + marked.mark("fidelity"))
+    console.print()
+    for line in sketch(case, min(console.width, PAGE), pen_for(console.encoding)):
+        console.print(line, soft_wrap=True)
+    sheet = Sheet(room=40)
+    _strip(sheet, case, report, marked)
+    _powders(sheet, case, report, marked)
+    _gas(sheet, case, report, marked)
+    _ports(sheet, case, report, marked)
+    _motion(sheet, case, report, marked)
+    _engineering(sheet, report)
+    _cost(sheet, case, report, marked)
+    sheet.print(console)
+    _sentences(console, "To know", report["notes"])
+    _sentences(console, "Without effect in this case", report["without_effect"])
+    _sentences(console, "Marks", [MARKS])
+    if report["warnings"]:
+        console.print()
+    print_warnings(console, report["warnings"])
 
 
-def _layer_table(case: Case) -> Listing:
-    table = Listing(
-        "layer", "height [mm]", "rows", "material", "porosity", "k [um2]", "tau2", "S [1/m]", "sites [mol/m2]"
+def print_full(case: Case, console: Console) -> None:
+    """Print the resolved case: every key of every table, its value with its unit, and where that comes from."""
+    sheet = Sheet(room=40)
+    table = None
+    for value in values(case):
+        parts = value.name.rsplit(".", 2 if value.key.name.endswith(">") else 1)
+        place, label = ("", parts[0]) if len(parts) == 1 else (parts[0], ".".join(parts[1:]))
+        if place != table:
+            sheet.group(place or "Case")
+            table = place
+        if value.text:
+            sheet.add(label, f"{_text(value)} {together(f'({value.origin})')}")
+    sheet.print(console)
+
+
+def _sentences(console: Console, heading: str, sentences: list[str]) -> None:
+    if sentences:
+        console.print()
+        say(console, heading, style="bold")
+    for sentence in sentences:
+        say(console, printable(sentence), 2)
+
+
+def _what(case: Case, report: dict[str, Any]) -> str:
+    """The kind of run in words."""
+    if case.fidelity == "steady":
+        return "steady: the state that the reactor settles into, as the mean of the vibration cycle"
+    how = "every phase of every cycle" if case.fidelity == "resolved" else "the mean of the vibration cycle"
+    return f"{case.fidelity}: {how}, 0 s to {case.time.end:g} s in {report['run']['steps']:,} steps"
+
+
+def _strip(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
+    geometry, mesh = case.geometry, report["mesh"]
+    sheet.group("Strip")
+    sheet.add("length", marked.text("geometry.length"))
+    ends = (
+        "periodic: gas leaving at the right comes back at the left"
+        if geometry.periodic
+        else "closed by walls"
     )
+    sheet.add("ends", ends + marked.mark("geometry.periodic"))
+    if geometry.moving_layer is not None:
+        side = "left" if case.direction > 0 else "right"
+        solids = {
+            "fresh": f"fresh, at the {side}",
+            "periodic": f"at the {side} as they left at the other end",
+        }
+        sheet.add("solids come in", solids[geometry.bed_inflow] + marked.mark("geometry.bed_inflow"))
+    layers = Listing("layer", "height [mm]", "rows", "material")
+    for layer in reversed(geometry.layers):
+        name = layer.name + (" (moving)" if layer.moving else "")
+        height = f"{layer.height * 1e3:.6g}"
+        layers.add_row(name, height, str(layer.cells), layer.material_name or "gas")
+    sheet.list(layers)
+    for zone in geometry.zones:
+        dosed = f", dosed by {zone.inlet}" if zone.inlet else ""
+        sheet.add(
+            f"zone {zone.name}", f"{number(zone.start * 1e3)} to {number(zone.end * 1e3, 'mm', 6)}{dosed}"
+        )
+    columns = f"{mesh['columns']} columns of {number(mesh['column_width'] * 1e3, 'mm', 3)}"
+    mark = marked.mark("geometry.cell_width")
+    sheet.add("mesh", f"{mesh['cells']:,} cells: {columns}{mark}, {mesh['rows']} rows")
+
+
+_POWDER = (
+    ("porosity", "porosity"),
+    ("permeability", "permeability"),
+    ("tortuosity_factor", "tortuosity factor"),
+    ("surface_to_volume", "surface per total volume"),
+    ("density", "density of the solid"),
+    ("particle_diameter", "particle diameter"),
+    ("sphericity", "sphericity"),
+)
+
+
+def _powders(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
     for layer in reversed(case.geometry.layers):
-        cells = [
-            layer.name + (" (moving)" if layer.moving else ""),
-            f"{layer.height * 1e3:g}",
-            str(layer.cells),
-        ]
-        material = layer.material
-        if material is None:
-            table.add_row(*cells, "gas")
+        material, name = layer.material, layer.material_name
+        if material is None or name is None:
             continue
-        table.add_row(
-            *cells,
-            layer.material_name,
-            f"{material.porosity:g}",
-            _pair(k * 1e12 for k in material.permeability),
-            _pair(material.tortuosity_factor),
-            f"{material.surface_to_volume:g}",
-            f"{material.site_density:.3g}",
-        )
-    return table
-
-
-def _pair(values: Iterable[float]) -> str:
-    return " / ".join(dict.fromkeys(f"{value:.3g}" for value in values))
-
-
-def _port_table(case: Case, report: dict[str, Any]) -> Listing:
-    table = Listing(
-        "port",
-        "at [mm]",
-        "width [mm]",
-        "v [cm/s]",
-        "mass fractions",
-        "doses [s]",
-        "Re",
-        "excess",
-        "dose ratio",
-    )
-    for inlet in case.geometry.inlets:
-        numbers = report["inlets"][inlet.name]
-        feed = ", ".join(f"{name} {value:g}" for name, value in inlet.mass_fractions.items())
-        times = ", ".join(f"{a:g}-{b:g}" if b < math.inf else f"from {a:g}" for a, b in inlet.windows)
-        table.add_row(
-            inlet.name,
-            f"{inlet.center * 1e3:g}",
-            f"{inlet.width * 1e3:g}",
-            f"{inlet.velocity * 1e2:g}",
-            feed or case.gas.carrier,
-            times if feed else "",
-            f"{numbers['Re']:.3g}",
-            *(f"{numbers[key]:.3g}" if key in numbers else "" for key in ("excess_number", "dose_ratio")),
-        )
-    for outlet in case.geometry.outlets:
-        table.add_row(f"{outlet.name} (outlet)", f"{outlet.center * 1e3:g}", f"{outlet.width * 1e3:g}")
-    return table
-
-
-def _number_table(case: Case, report: dict[str, Any]) -> Listing:
-    table = Listing("quantity", "value", "unit")
-    motion, bed, gas = report["motion"], report.get("bed", {}), report["gas"]
-
-    def row(name: str, value: float | None, unit: str = "", scale: float = 1.0) -> None:
-        if value is not None:
-            table.add_row(name, f"{value * scale:.4g}", unit)
-
-    row("gas density", gas["density"], "kg/m3")
-    row("gas viscosity", gas["viscosity"], "Pa s")
-    for value, origin in dict.fromkeys(
-        (d, gas["diffusivity_from"][s]) for s, d in gas["diffusivity"].items()
-    ):
-        alike = [
-            s for s, d in gas["diffusivity"].items() if (d, gas["diffusivity_from"][s]) == (value, origin)
+        sheet.group(f"{layer.name}: {name}")
+        for key, label in _POWDER:
+            if key == "sphericity" and material.particle_diameter is None:
+                continue
+            sheet.add(label, marked.text(f"material.{name}.{key}"))
+        key = f"material.{name}.site_density"
+        per_area = number(report["sites_per_nm2"][layer.name], "sites per nm^2", 3)
+        sheet.add("surface sites", f"{per_area}, {marked.text(key)}")
+        covered = [
+            f"{site} {share:g}{marked.mark(f'material.{name}.initial_coverage.{site}')}"
+            for site, share in material.initial_coverage.items()
+            if share
         ]
-        row(f"diffusivity, {origin}: {', '.join(alike)}", value, "m2/s")
-    row("mean free path of the gas", gas["mean_free_path"], "um", 1e6)
-    for name, pores in report["pores"].items():
-        row(f"{name}: diameter of its pores, sqrt(32 tau2 k/porosity)", pores["diameter"], "um", 1e6)
-        row(f"{name}: Knudsen number, mean free path over it", pores["Knudsen"])
-    row("amplitude, horizontal", motion["amplitude_x"], "mm", 1e3)
-    row("amplitude, vertical", motion["amplitude_y"], "mm", 1e3)
-    row("peak velocity, horizontal (perfect flight)", motion["perfect_flight"], "cm/s", 1e2)
-    row("peak velocity, vertical", motion["peak_velocity_y"], "cm/s", 1e2)
-    row("straight drop limit", motion["straight_drop"], "cm/s", 1e2)
-    mean = "" if case.motion.table is None else f", mean of {Path(case.motion.profile).name}"
-    row(f"bed velocity{mean}", motion["bed_velocity"], "cm/s", 1e2)
+        sheet.add("share of the sites at first", ", ".join(covered))
+        pores = report["pores"][layer.name]
+        if "diameter" in pores:
+            sheet.add("pores, as straight capillaries", number(pores["diameter"] * 1e6, "um wide"))
+        if "Knudsen" in pores:
+            kn = number(pores["Knudsen"], digits=3)
+            sheet.add("Knudsen number of the pores", f"{kn} (gas is a continuum below 0.01)")
+
+
+def _gas(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
+    gas = report["gas"]
+    sheet.group("Gas and reactions")
+    for key in ("carrier", "temperature", "pressure", "density", "viscosity"):
+        sheet.add(key, marked.text(f"gas.{key}"))
+    if "mean_free_path" in gas:
+        sheet.add("mean free path", number(gas["mean_free_path"] * 1e6, "um"))
+    alike: dict[str, list[str]] = {}
+    for species in gas["diffusivity"]:
+        scaled = gas["diffusivity_from"][species] == "scaled"
+        origin = (
+            " (worked out: scaled from 2.88e-5\u00a0m^2/s in N2 at 473\u00a0K, 101325\u00a0Pa)"
+            if scaled
+            else marked.mark(f"gas.diffusivity.{species}")
+        )
+        text = _text(marked.values[f"gas.diffusivity.{species}"]) + origin
+        alike.setdefault(text, []).append(species)
+    for text, names in alike.items():
+        sheet.add("diffusivity" if len(alike) == 1 else f"diffusivity of {', '.join(names)}", text)
+    for index, reaction in enumerate(report["reactions"]):
+        mark = marked.mark("chemistry.mechanism")
+        label = f"mechanism {case.chemistry.mechanism}{mark}" if index == 0 else ""
+        sheet.add(label or "and", re.sub(r"(?<=\b\d) (?=\S)", "\u00a0", reaction))
+
+
+def _ports(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
+    sheet.group(
+        f"Ports ({together('sccm/m')}: standard cm^3/min per metre of depth, at {together('0 degC')} and {together('101325 Pa')})"
+    )
+    for kind, ports in (("inlet", case.geometry.inlets), ("outlet", case.geometry.outlets)):
+        for port in ports:
+            place = f"geometry.{kind}.{port.name}"
+            side = "below" if port.side == "bottom" else "above"
+            where = f"at {marked.text(f'{place}.center')}, {marked.text(f'{place}.width')} wide"
+            sheet.add(f"{kind} {port.name}, {side}", where)
+            if isinstance(port, Inlet):
+                _feed(sheet, case, port, report["inlets"][port.name], marked)
+
+
+def _feed(sheet: Sheet, case: Case, inlet: Inlet, numbers: dict[str, Any], marked: Marked) -> None:
+    """What an inlet blows, and how much that is."""
+    place = f"geometry.inlet.{inlet.name}"
+    flow = f"{number(numbers['sccm_per_metre'], 'sccm/m')}, Re {number(numbers['Re'], digits=3)}"
+    sheet.add("flow", f"{marked.text(f'{place}.velocity')}, {flow}", part=True)
+    if not inlet.mass_fractions:
+        sheet.add("feeds", f"{case.gas.carrier} alone", part=True)
+    for species, fraction in inlet.mass_fractions.items():
+        mole = number(numbers["mole_fractions"][species])
+        sheet.add(
+            f"feeds {species}",
+            f"mass fraction {number(fraction)}, mole fraction {mole}, {_windows(inlet, marked)}",
+            part=True,
+        )
+    if "excess_number" in numbers:
+        ratio = (
+            f", {number(numbers['dose_ratio'], digits=3)} times what saturates"
+            if "dose_ratio" in numbers
+            else ""
+        )
+        sheet.add(
+            "dose",
+            f"{number(numbers['excess_number'], digits=3)} molecules per passing site{ratio}",
+            part=True,
+        )
+
+
+def _windows(inlet: Inlet, marked: Marked) -> str:
+    """When an inlet doses."""
+    times = [
+        f"from {a:g}\u00a0s" + (" on" if math.isinf(b) else f" to {b:g}\u00a0s") for a, b in inlet.windows
+    ]
+    mark = marked.mark(f"geometry.inlet.{inlet.name}.start") if len(inlet.windows) == 1 else ""
+    return ", ".join(times) + mark
+
+
+def _motion(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
+    motion, told = report["motion"], " ".join(report["without_effect"])
+    heading = "Motion"
+    if not case.follows_cycle and case.motion.gamma > 0.0 and "motion.gamma" not in told:
+        heading += (
+            f" (of which fidelity {case.fidelity} sees the bed's mean velocity alone, not the vibration)"
+        )
+    sheet.group(heading)
+    sheet.add("vertical acceleration over g", marked.text("motion.gamma"))
+    if case.motion.gamma > 0.0:
+        sheet.add("frequency", marked.text("motion.frequency"))
+        angle_from = marked.text("motion.angle_from")
+        sheet.add("angle", f"{marked.text('motion.angle')} from the {angle_from}")
+        for label, key in (("horizontal", "x"), ("vertical", "y")):
+            amplitude = number(motion[f"amplitude_{key}"] * 1e3, "mm")
+            peak = number(motion[f"peak_velocity_{key}"] * 1e2, "cm/s")
+            sheet.add(f"{label} amplitude, peak velocity", f"{amplitude}, {peak}")
+    if case.geometry.moving_layer is not None:
+        speed = number(motion["bed_velocity"] * 1e2, "cm/s")
+        table = case.motion.table is not None
+        sheet.add(
+            "mean velocity of the bed",
+            f"{speed}, the mean of {Path(case.motion.profile).name}"
+            if table
+            else marked.text("motion.bed_velocity"),
+        )
+        if case.follows_cycle:
+            sheet.add("profile of the bed's velocity", marked.text("motion.profile"))
+        if case.motion.gamma > 0.0 and "perfect_flight" in motion:
+            limits = f"{number(motion['straight_drop'] * 1e2)} and {number(motion['perfect_flight'] * 1e2, 'cm/s')}"
+            sheet.add("straight drop and perfect flight", f"convey at {limits}")
+    if case.fidelity != "steady":
+        sheet.add("motion starts at", marked.text("motion.start"))
+
+
+def _engineering(sheet: Sheet, report: dict[str, Any]) -> None:
+    """Numbers that are worked out on paper before a run."""
+    sheet.group("Numbers an engineer asks for")
+
+    def row(label: str, value: float | None, unit: str = "", scale: float = 1.0, part: bool = False) -> None:
+        sheet.add(label, None if value is None else number(value * scale, unit), part)
+
+    bed = report.get("bed", {})
     row("time of the bed in the strip", bed.get("residence_time"), "s")
     row("gas rising through the bed, at most", bed.get("gas_velocity"), "cm/s", 1e2)
     row("minimum fluidisation, Ergun", bed.get("minimum_fluidisation_ergun"), "cm/s", 1e2)
     row("minimum fluidisation, Wen and Yu", bed.get("minimum_fluidisation_wen_yu"), "cm/s", 1e2)
-    row("gas velocity over minimum fluidisation", bed.get("gas_over_minimum_fluidisation"))
+    row("rising gas over minimum fluidisation", bed.get("gas_over_minimum_fluidisation"))
     row("pressure drop of the bed", bed.get("pressure_drop"), "Pa")
-    row("Re of a particle", bed.get("Re_particle"))
+    row("Reynolds number of a particle", bed.get("Re_particle"))
     for name, numbers in report["inlets"].items():
-        row(f"{name}: Pe through the bed", numbers.get("Pe_bed"))
-        row(f"{name}: Damkoehler, over convection", numbers.get("Damkoehler_convection"))
-        row(f"{name}: Damkoehler, over diffusion", numbers.get("Damkoehler_diffusion"))
-        row(f"{name}: reaction front", numbers.get("front_thickness"), "um", 1e6)
-        row(f"{name}: lifetime of a site", numbers.get("site_lifetime"), "us", 1e6)
-        row(f"{name}: lifetime in the gas", numbers.get("gas_lifetime"), "us", 1e6)
-    return table
+        if "species" not in numbers:
+            continue
+        sheet.add(f"{numbers['species']} of {name} in the bed", "")
+        row("Peclet, convection over diffusion", numbers.get("Pe_bed"), part=True)
+        row("Damkoehler, reaction over convection", numbers.get("Damkoehler_convection"), part=True)
+        row("Damkoehler, reaction over diffusion", numbers.get("Damkoehler_diffusion"), part=True)
+        row("thickness of the reaction front", numbers.get("front_thickness"), "um", 1e6, True)
+        row("lifetime of a site", numbers.get("site_lifetime"), "us", 1e6, True)
+        row("lifetime in the gas", numbers.get("gas_lifetime"), "us", 1e6, True)
+
+
+def _cost(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
+    run = report["run"]
+    sheet.group("Time and cost")
+    if case.fidelity == "steady":
+        sheet.add("time", "none: the steady state is solved for at once")
+    else:
+        sheet.add("end", marked.text("time.end"))
+        key = "time.steps_per_cycle" if case.fidelity == "resolved" else "time.step"
+        asked = (
+            f"{marked.text(key)} per cycle"
+            if case.fidelity == "resolved"
+            else f"at most {marked.text(key)}, fitted to the columns of the bed"
+        )
+        sheet.add("step", f"{number(run['step'] * 1e3, 'ms')}: {asked}")
+        sheet.add("steps", f"{run['steps']:,}")
+        sheet.add("output every", marked.text("output.every"))
+    sheet.add("memory, about", number(run["peak_memory_bytes"] / 1e9, "GB", 2))
+    if case.follows_cycle and "flow_courant" in run:
+        sheet.add("Courant number of the gas, at most", number(run["flow_courant"], digits=2))
+    if "numerical_diffusion" in run:
+        share = number(100.0 * run["numerical_diffusion"], "% of the diffusivity", 2)
+        sheet.add("numerical diffusion along the bed", share)

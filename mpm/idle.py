@@ -1,9 +1,16 @@
-"""Keys that somebody typed and that nothing reads in this case. They stay legal: another fidelity may use them."""
+"""Keys that somebody typed and that nothing reads in this case. They stay legal: another fidelity may use them.
+
+A key whose value is the one that it has when it is left out is not named: it says nothing. So the resolved case that a run writes, which
+gives every key, names only those that its own case did.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
+
+from mpm.materials import BUILT_IN, Material
 
 if TYPE_CHECKING:
     from mpm.case import Case
@@ -31,7 +38,15 @@ Idle = Iterator[tuple[str, str]]
 
 
 def _typed(model: Any, table: str, keys: Iterable[str], why: str) -> Idle:
-    return ((f"{table}.{key}", why) for key in keys if key in model.model_fields_set)
+    return ((f"{table}.{key}", why) for key in keys if key in model.model_fields_set and _says(model, key))
+
+
+def _says(model: Any, key: str) -> bool:
+    """Whether the key's value is another than its default."""
+    value, default = getattr(model, key), type(model).model_fields[key].get_default()
+    if isinstance(value, float) and isinstance(default, float):
+        return not math.isclose(value, default, rel_tol=1e-12)
+    return bool(value != default)
 
 
 def _of_motion(case: Case) -> Idle:
@@ -100,8 +115,9 @@ def _of_solids(case: Case) -> Idle:
             continue
         given = case.typed(f"material.{name}")
         material = case.materials[name]
+        usual = Material.model_validate(BUILT_IN[name]) if name in BUILT_IN else None
         for key in ("heat_capacity", "conductivity"):
-            if key in given:
+            if key in given and (usual is None or getattr(usual, key) != getattr(material, key)):
                 yield f"material.{name}.{key}", "temperature is one number, gas.temperature"
         if "kozeny_constant" in given and material.particle_diameter is None:
             yield f"material.{name}.kozeny_constant", "it needs a particle_diameter"

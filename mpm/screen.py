@@ -7,6 +7,7 @@ words, characters that the terminal does not have are spelled out instead of end
 from __future__ import annotations
 
 import io
+import re
 import sys
 import textwrap
 from typing import TYPE_CHECKING
@@ -91,9 +92,15 @@ def together(text: str) -> str:
     return text.replace(" ", _HARD_SPACE)
 
 
+def figure(value: float, unit: str = "", digits: int = 4) -> str:
+    """`value` with its unit; powers of ten as `6.92e-8`."""
+    text = re.sub(r"e([+-])0*(?=\d)", lambda power: "e" + power[1].replace("+", ""), f"{value:.{digits}g}")
+    return f"{text} {unit}".strip()
+
+
 def number(value: float, unit: str = "", digits: int = 4) -> str:
-    """`value` with its unit, kept together."""
-    return together(f"{value:.{digits}g} {unit}".strip())
+    """`figure`, kept together on one line."""
+    return together(figure(value, unit, digits))
 
 
 def _clean(text: str) -> str:
@@ -130,30 +137,40 @@ class Sheet:
 
     def __init__(self, room: int) -> None:
         self.room = room
-        self.groups: list[tuple[str, list[tuple[str, str]]]] = []
+        self.groups: list[tuple[str, list[tuple[str, str] | Listing]]] = []
 
     def group(self, heading: str) -> None:
         """Begin a group; one that stays empty is not printed."""
         self.groups.append((heading, []))
 
-    def add(self, label: str, value: str | None) -> None:
-        """A row of the last group; None: the number does not exist here."""
+    def add(self, label: str, value: str | None, part: bool = False) -> None:
+        """A row of the last group, below the one before it if it is a `part` of that; None: the number does not exist here."""
         if value is not None:
-            self.groups[-1][1].append((_clean(label), _clean(value)))
+            self.groups[-1][1].append((2 * _HARD_SPACE * part + _clean(label), _clean(value)))
+
+    def list(self, listing: Listing) -> None:
+        """Rows of the last group that are a table where there is room for one."""
+        self.groups[-1][1].append(listing)
 
     def print(self, console: Console) -> None:
         """Values stand in a column; where a label leaves no room for it, and on narrow terminals, they follow it."""
         room = min(console.width - self.room, 60)
-        rows = [row for _, group in self.groups for row in group]
+        rows = [row for _, group in self.groups for row in group if not isinstance(row, Listing)]
         column = max((len(label) for label, _ in rows if len(label) <= room), default=0) + 2
         for heading, group in self.groups:
             if not group:
                 continue
             console.print()
             say(console, heading, style="bold")
-            for label, value in group:
+            for row in group:
+                if isinstance(row, Listing):
+                    row.print(console)
+                    continue
+                label, value = row
                 crowded = len(value) > console.width - column - 2 and console.width - column < 40
-                if len(label) > column - 2 or console.width < NARROW or crowded:
+                if not value:
+                    say(console, label, 2)
+                elif len(label) > column - 2 or console.width < NARROW or crowded:
                     say(console, f"{label}: {value}", 2)
                 else:
                     say(console, f"{label:{column}}".replace(" ", _HARD_SPACE) + value, 2, column)

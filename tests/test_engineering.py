@@ -78,13 +78,13 @@ MADE = '# conditions = { frequency = "16 Hz", gamma = 0.3, angle = "60 deg", wav
 @pytest.mark.parametrize(
     ("comment", "motion", "texts"),
     [
-        (MADE, {}, ["motion.bed_velocity, 1.3 cm/s, has no effect: the bed moves as p.csv says, 1 cm/s"]),
-        ("# by hand\n", {}, ["has no effect", "does not say under which vibration it was made"]),
-        (MADE, {"gamma": 0.4}, ["has no effect", "made at gamma 0.3, the reactor vibrates at 0.4"]),
-        (MADE, {"angle": "45 deg"}, ["has no effect", "made at 60 deg from the horizontal, the reactor vibrates at 45 deg"]),
-        (MADE, {"angle": "30 deg", "angle_from": "vertical"}, ["has no effect"]),
-        (MADE.replace("sine", "sawtooth"), {"gamma": 0.4}, ["has no effect", "made with a sawtooth waveform"]),
-        (MADE, {"gamma": 0.0}, ["motion.profile, p.csv, has no effect: without vibration"]),
+        (MADE, {}, ["motion.bed_velocity: the bed does not move at 1.3 cm/s but as p.csv says, 1 cm/s"]),
+        ("# by hand\n", {}, ["motion.bed_velocity: ", "does not say under which vibration it was made"]),
+        (MADE, {"gamma": 0.4}, ["motion.bed_velocity: ", "made at gamma 0.3, the reactor vibrates at 0.4"]),
+        (MADE, {"angle": "45 deg"}, ["motion.bed_velocity: ", "made at 60 deg from the horizontal, the reactor vibrates at 45 deg"]),
+        (MADE, {"angle": "30 deg", "angle_from": "vertical"}, ["motion.bed_velocity: "]),
+        (MADE.replace("sine", "sawtooth"), {"gamma": 0.4}, ["motion.bed_velocity: ", "made with a sawtooth waveform"]),
+        (MADE, {"gamma": 0.0}, ["motion.profile: the bed does not move as p.csv says but steadily"]),
     ],
 )  # fmt: skip
 def test_a_profile_that_does_not_belong_is_said(
@@ -226,7 +226,14 @@ def test_check_prints_tables_and_warnings(
     monkeypatch.setenv("COLUMNS", "160")
     assert main(["check", str(EXAMPLE), "--set", "motion.bed_velocity='3 cm/s'"]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    for part in ("28,359 cells", "glass_beads", "TMA 0.0002", "excess", "perfect flight", "OH + TMA -> CH4"):
+    for part in (
+        "28,359 cells",
+        "glass_beads",
+        "mass fraction 0.0002",
+        "molecules per passing site",
+        "perfect flight",
+        "OH + TMA -> CH4",
+    ):
         assert part in text
     assert "warning: the bed is conveyed at 3 cm/s" in text
 

@@ -44,9 +44,9 @@ def test_no_terminal_cuts_a_number(width: int) -> None:
         "flow": {"bed_superficial_velocity": [1.0], "inflow": 1.234e-10},
     }
     for show, arguments, wanted in (
-        (print_report, (case, check_case(case)), ("6.92e-08", "2.85 / 2.68", "sintered_powder", "104.775", "headspace")),
+        (print_report, (case, check_case(case)), ("6.9212e-8", "2.85 / 2.68", "sintered_powder", "104.775", "headspace")),
         (print_mesh, (case,), ("headspace", "139.7", "28,359", "102.775")),
-        (print_summary, (summary,), ("1.792", "1.234e-06", "cm^2/s")),
+        (print_summary, (summary,), ("1.792", "1.234e-6", "cm^2/s")),
     ):  # fmt: skip
         text = text_of(width, show, *arguments)
         assert "…" not in text and "..." not in text
@@ -97,7 +97,7 @@ def test_titles_are_shown_as_written(title: str, capsys: pytest.CaptureFixture[s
     print_report(case, check_case(case), screen())
     first = capsys.readouterr().out.splitlines()[0]
     shown = title.replace("\n", " ").replace("\x1b", "\\x1b")
-    assert first == f"{shown}: averaged, to 20 s"
+    assert first == shown
 
 
 def test_sites_and_materials_keep_their_brackets(capsys: pytest.CaptureFixture[str]) -> None:
@@ -178,7 +178,7 @@ def test_the_numbers_of_a_run() -> None:
         "superficial gas velocity in the bed, along 0 cm/s",
         "superficial gas velocity in the bed, upwards 0.2 cm/s",
         "mole fraction of TMA in zone1 0",
-        "mole fraction of H2O in zone1 2e-06",
+        "mole fraction of H2O in zone1 2e-6",
         "TMA: fed 10 umol/m, reacted 10 umol/m, left 0 umol/m",
         "largest relative error of a balance: 3.0e-14 (balance error of TMA)",
     ):

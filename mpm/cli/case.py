@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -42,9 +43,13 @@ def check(
     as_json: Annotated[
         bool, typer.Option("--json", help="one JSON object with SI numbers and the resolved case")
     ] = False,
+    full: Annotated[
+        bool,
+        typer.Option("--full", help="every key of the resolved case with its unit and where it comes from"),
+    ] = False,
     settings: SetOption = None,
 ) -> None:
-    """Validate a case and print what an engineer asks first."""
+    """Validate a case and print what an engineer asks first: a sketch, what is default, doses, warnings."""
     from mpm.case import load_case
     from mpm.checks import check_case
 
@@ -57,9 +62,16 @@ def check(
 
         print(json.dumps({**report, "case": loaded.to_dict()}, indent=2, allow_nan=False))
         return
-    from mpm.checkscreen import print_report
+    from mpm.checkscreen import print_full, print_report
+    from mpm.nextsteps import print_steps
 
+    if full:
+        print_full(loaded, screen())
+        return
     print_report(loaded, report, screen())
+    options = [part for setting in settings or [] for part in ("--set", setting)]
+    screen().print()
+    print_steps([(shlex.join(["mpm", "run", case, *options]), "results/, with a report")], screen())
 
 
 @app.command()
