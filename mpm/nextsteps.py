@@ -33,9 +33,8 @@ def print_next_steps(directory: Path, summary: dict[str, Any], console: Console)
         (f"mpm plot {name}", "pictures, into its plots/"),
     ]
     if summary.get("fidelity") != "steady":
-        later = f"time.end='{2.0 * summary['simulated_seconds']:g} s'"
-        case = shlex.quote(str(directory / "case.toml"))
-        steps.append((f"mpm run {case} -o {name} --resume --set {later}", "on to a later time"))
+        later = f"{2.0 * summary['simulated_seconds']:g} s"
+        steps.append((f"mpm resume {name} --end '{later}'", "on to a later time"))
     console.print()
     say(console, f"Results: {directory}")
     print_steps(steps, console)
