@@ -27,17 +27,18 @@ from pydantic import (
     model_validator,
 )
 
-from mpm.caseio import assemble, built_in_files, find_file, write_toml
+from mpm.caseio import assemble, write_toml
 from mpm.chemistry import Mechanism
 from mpm.constants import GRAVITY
 from mpm.diffusion import scaled_diffusivity
-from mpm.files import is_file, read_text
-from mpm.gases import CARRIERS, ideal_gas_density
+from mpm.files import read_text
+from mpm.gases import CARRIERS, ideal_gas_density, symbol
 from mpm.kinds import CASE, read_input
 from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
 from mpm.mechanism import Chemistry, build_mechanism, check_rates
 from mpm.messages import to_input_error
+from mpm.names import case_file
 from mpm.profile import PRESETS, BedProfile, read_profile
 from mpm.schema import finished
 from mpm.units import (
@@ -146,7 +147,7 @@ class Gas(Frozen):
                 repr(self.carrier),
                 f"one of {', '.join(CARRIERS)}, or any name with molar_mass and viscosity",
                 key="carrier",
-                given=self.carrier,
+                given=symbol(self.carrier),
                 known=list(CARRIERS),
             )
         if "molar_mass" not in given and model is not None:
@@ -485,9 +486,7 @@ def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, An
     """
     if isinstance(source, Mapping):
         return _build(source, overrides or {}, Path.cwd(), "case")
-    path = Path(source)
-    if isinstance(source, str) and not is_file(path) and source in built_in_files("cases"):
-        path = find_file("cases", source, Path.cwd(), source, "")
+    path = case_file(source) if isinstance(source, str) else source
     case = _build(read_input(path, CASE), overrides or {}, path.resolve().parent, str(source))
     case._source = path
     return case

@@ -103,7 +103,7 @@ def find_file(folder: str, name: str, near: Path, source: str, key: str) -> Path
             key,
             f"{name!r}, no such file",
             f"a path, or one of {', '.join(built_in)}",
-            given=name,
+            given=Path(name).name,
             known=built_in,
         )
     return path.resolve()

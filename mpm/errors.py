@@ -104,6 +104,9 @@ def nearest(given: str, known: Iterable[str]) -> str | None:
     """Return the one of `known` that `given` was probably meant to be, or None."""
     by_lower = {name.lower(): name for name in known}
     close = difflib.get_close_matches(given.lower(), by_lower, n=1, cutoff=0.6)
+    if not close and len(given) >= 3:  # the beginning of one name only
+        begun = [name for name in by_lower if name.startswith(given.lower())]
+        close = begun if len(begun) == 1 else []
     return by_lower[close[0]] if close else None
 
 

@@ -34,6 +34,14 @@ CARRIERS = {
 }
 
 
+_SPELT_OUT = {"nitrogen": "n2", "argon": "ar", "helium": "he"}
+
+
+def symbol(name: str) -> str:
+    """What a gas spelt out is called here, in lower case: a message then suggests the right spelling; else the name itself."""
+    return _SPELT_OUT.get(name.lower(), name)
+
+
 def ideal_gas_density(pressure: float, molar_mass: float, temperature: float) -> float:
     """Density p M/(R T) [kg/m3] of an ideal gas; pressure [Pa], molar mass [kg/mol], temperature [K]."""
     return pressure * molar_mass / (GAS_CONSTANT * temperature)

@@ -9,7 +9,8 @@ from typing import Any, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from mpm.errors import InputError
+from mpm.errors import InputError, nearest
+from mpm.materials import BUILT_IN
 from mpm.units import Dimension, describe
 
 _LATER = {"missing": 1, "too_short": 2}
@@ -24,6 +25,8 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
     key = address(location, data)
     if kind == "mpm":
         key = ".".join(part for part in (key, context.get("key", "")) if part)
+        if context["found"] == "nothing":
+            return _missing(source, key, context["accepted"], location, data)
         return InputError.at(
             source,
             key,
@@ -38,13 +41,52 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
             source, key, "an unknown key", f"one of {', '.join(known)}", known=known, given=str(location[-1])
         )
     if kind == "missing":
-        return InputError.at(source, key, "nothing", _expected(_field(model, location)), given="")
+        return _missing(source, key, _expected(_field(model, location)), location, data)
     found = describe(first["input"])
     if kind == "literal_error":
         choices = [choice.strip("'") for choice in context["expected"].replace(" or ", ", ").split(", ")]
         return InputError.at(source, key, found, ", ".join(choices), known=choices, given=str(first["input"]))
     text = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     return InputError.at(source, key, found, _WORDS.get(kind, text), given="")
+
+
+def _missing(source: str, key: str, accepted: str, location: Sequence[int | str], data: Any) -> InputError:
+    """A key is missing: perhaps because the name of its table is misspelt, and what was meant is there under another."""
+    name, others = _entry_and_others(location, data)
+    if nearest(name, others) is None:
+        return InputError.at(source, key, "nothing", accepted, given="")
+    accepted = f"{accepted}; or one of the names {', '.join(others)} in place of {name}"
+    return InputError.at(source, key, "nothing", accepted, given=name, known=others)
+
+
+_NAMED = (
+    ("material",),
+    ("chemistry", "species"),
+    ("chemistry", "site"),
+    ("chemistry", "film"),
+    ("chemistry", "reaction"),
+)
+"""Tables whose keys are names."""
+
+
+def _entry_and_others(location: Sequence[int | str], data: Any) -> tuple[str, list[str]]:
+    """The name of the entry that `location` lies in, and the names of its neighbours (of a material: the built-in ones too)."""
+    name, others = "", []
+    for place, part in enumerate(location):
+        if isinstance(part, int) and isinstance(data, list) and part < len(data):
+            names = [str(entry.get("name")) for entry in data if isinstance(entry, dict)]
+            name = str(data[part].get("name")) if isinstance(data[part], dict) else ""
+            others, data = [other for other in names if other != name], data[part]
+        elif isinstance(data, dict):
+            if tuple(location[:place]) in _NAMED:
+                name = str(part)
+                others = [
+                    str(key)
+                    for key in (*data, *(BUILT_IN if location[0] == "material" else ()))
+                    if key != part
+                ]
+            data = data.get(part)
+    return name, list(dict.fromkeys(others))
 
 
 _WORDS = {
@@ -111,4 +153,4 @@ def _expected(field: FieldInfo | None) -> str:
         return "a list of tables, [[...]]"
     if field is not None and field.annotation is int:
         return "a whole number"
-    return (field.description if field else None) or "a value"
+    return field.description.partition(". ")[0] if field and field.description else "a value"

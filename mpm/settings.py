@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from mpm.errors import InputError
@@ -23,5 +24,20 @@ def parse_settings(settings: Sequence[str] | None, example: str = "motion.gamma=
             table = parse_toml(f"value = {text}", "--set")
         except InputError:
             table = {"value": text}
-        overrides[key.strip()] = table["value"] if len(table) == 1 else text
+        overrides[key.strip()] = _where_typed(key.strip(), table["value"] if len(table) == 1 else text)
     return overrides
+
+
+PATHS = ("geometry.base", "chemistry.mechanism", "motion.profile", "waveform.file")
+"""Keys whose value may be the path of a file."""
+
+
+def _where_typed(key: str, value: Any) -> Any:
+    """A path typed in a shell is relative to where the user stands; a name stays one, unless there is a file of it."""
+    if key not in PATHS or not isinstance(value, str):
+        return value
+    from mpm.files import is_file
+
+    here = Path.cwd() / value
+    looks_like_a_name = not Path(value).suffix and len(Path(value).parts) == 1
+    return value if looks_like_a_name and not is_file(here) else str(here)

@@ -24,8 +24,9 @@ def mesh(
 ) -> None:
     """Write the gmsh mesh of a case or of a shared geometry, and list its zones, ports and cells."""
     from mpm.case import load_case
+    from mpm.names import case_or_geometry
 
-    loaded = load_case(case, parse_settings(settings))
+    loaded = load_case(case_or_geometry(case), parse_settings(settings))
     if rank() != 0:
         return
     from mpm.mesh import write_msh

@@ -18,6 +18,7 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from mpm.errors import InputError
 from mpm.gases import ideal_gas_density
 from mpm.kinds import POWDER, read_input
+from mpm.names import powder_file
 from mpm.units import (
     Density,
     Dimension,
@@ -265,8 +266,8 @@ def load_case(source: Path | str | Mapping[str, Any], overrides: Mapping[str, An
     if isinstance(source, Mapping):
         name, directory, data = "powder file", Path(), dict(source)
     else:
-        path = Path(source)
-        name, directory = str(path), path.parent
+        path = powder_file(source) if isinstance(source, str) else source
+        name, directory = str(source), path.parent
         data = read_input(path, POWDER)
     if "directory" in data:
         raise InputError(f"{name}: directory: unknown key")

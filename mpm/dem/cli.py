@@ -34,7 +34,7 @@ class RunByDefault(TyperGroup):
 app = typer.Typer(
     cls=RunByDefault,
     name="dem",
-    help="Bed velocity from particle simulations: mpm dem POWDER.toml [-o DIR], mpm dem waveform DATA.csv.",
+    help="Bed velocity from particle simulations: mpm dem POWDER [-o DIR], mpm dem waveform DATA.csv.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -44,7 +44,10 @@ app = typer.Typer(
 
 @app.command()
 def run(
-    powder: Annotated[Path, typer.Argument(metavar="POWDER.toml", help="a powder file, see docs/dem.md")],
+    powder: Annotated[
+        str,
+        typer.Argument(metavar="POWDER", help="a powder file (docs/dem.md), or the name of a built-in one"),
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/POWDER")
     ] = None,
@@ -66,7 +69,7 @@ def run(
     case.build_waveform()  # a bad data file is bad input: say so before anything is written
     if jobs is not None and jobs < 1:
         raise InputError(f"mpm dem: --jobs: found {jobs}; accepted: a number from 1")
-    directory = output or Path("results") / powder.stem
+    directory = output or Path("results") / Path(powder).stem
     if resume and kind_of_directory(directory) is not DEM_RUN:
         raise InputError.at(directory, "", f"nothing to resume: {what_it_is(directory)}", DEM_RUN.words)
     if rank() == 0 and not quiet:
