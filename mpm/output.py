@@ -90,7 +90,8 @@ class RunDirectory:
         try:
             if self.path.is_dir() and any(self.path.iterdir()) and not (resume or overwrite):
                 raise InputError(
-                    f"{self.path}: not empty; use --resume, --overwrite or another directory (-o)"
+                    f"{self.path}: not empty; --resume goes on with the run in it, --overwrite replaces it, "
+                    "-o DIR or --name auto takes another directory"
                 )
             self.path.mkdir(parents=True, exist_ok=True)
             self._lock = lock(self.log, PATIENCE)

@@ -7,25 +7,42 @@ from typing import Annotated
 
 import typer
 
+from mpm.cli.complete import complete_case, complete_run, complete_setting
+from mpm.cli.help import HELP_NAMES, App, Verbs
 from mpm.launcher import rank
 
-app = typer.Typer(
-    help="Moving porous media: vibrating powder reactors for atomic layer deposition.",
-    add_completion=False,
+app = App(
+    cls=Verbs,
+    context_settings=HELP_NAMES,
+    help="""Moving porous media: vibrating powder reactors for atomic layer deposition.
+
+    mpm check single_zone        what an engineer asks first about a case
+    mpm run single_zone          compute it
+    mpm help run                 a verb in full, with examples (or: mpm run -h)
+    """,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 
 RunArgument = Annotated[
-    Path, typer.Argument(metavar="DIR", help="the directory of a run, e.g. results/single_zone")
+    Path,
+    typer.Argument(
+        metavar="DIR", help="the directory of a run, e.g. results/single_zone", autocompletion=complete_run
+    ),
 ]
 CaseArgument = Annotated[
-    str, typer.Argument(metavar="CASE", help="a case file, or the name of a built-in case")
+    str,
+    typer.Argument(
+        metavar="CASE", help="a case file, or the name of a built-in case", autocompletion=complete_case
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="override a key, e.g. geometry.inlet.tma.velocity='4 cm/s'"
+        "--set",
+        metavar="KEY=VALUE",
+        help="override a key, e.g. geometry.inlet.tma.velocity='4 cm/s'; may be given several times",
+        autocompletion=complete_setting,
     ),
 ]
 
@@ -46,3 +63,16 @@ def _options(
                 print(f"{name:<11}{number}")
     elif context.invoked_subcommand is None and rank() == 0:
         print(context.get_help())
+
+
+@app.command(name="help", hidden=True)
+def help_(
+    context: typer.Context,
+    verb: Annotated[str | None, typer.Argument(metavar="VERB", help="one of those that mpm -h lists")] = None,
+) -> None:
+    """Explain a verb.
+
+    mpm help run        the same as mpm run -h
+    """
+    main = typer.main.get_command(app)
+    main.main([verb, "--help"] if verb else ["--help"], prog_name="mpm", standalone_mode=False)

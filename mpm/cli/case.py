@@ -22,7 +22,11 @@ def mesh(
     ] = None,
     settings: SetOption = None,
 ) -> None:
-    """Write the gmsh mesh of a case or of a shared geometry, and list its zones, ports and cells."""
+    """Write the gmsh mesh of a case or of a shared geometry, and list its zones, ports and cells.
+
+    mpm mesh single_zone                           writes single_zone.msh
+    mpm mesh wide.toml -o fine.msh --set geometry.cell_width='1 mm'
+    """
     from mpm.case import load_case
     from mpm.names import case_or_geometry
 
@@ -50,7 +54,13 @@ def check(
     ] = False,
     settings: SetOption = None,
 ) -> None:
-    """Validate a case and print what an engineer asks first: a sketch, what is default, doses, warnings."""
+    """Validate a case and print what an engineer asks first: a sketch, what is default, doses, warnings.
+
+    mpm check single_zone
+    mpm check wide.toml --set motion.gamma=0.4
+    mpm check wide.toml --full                     every key with its unit and where its value comes from
+    mpm check wide.toml --json                     for a program
+    """
     from mpm.case import load_case
     from mpm.checks import check_case
 
@@ -77,7 +87,10 @@ def check(
 
 @app.command()
 def schema() -> None:
-    """Print the JSON Schema of case files, for editors."""
+    """Print the JSON Schema of case files, for editors.
+
+    mpm schema > case.schema.json                  complete and check cases: "#:schema case.schema.json" on top of one
+    """
     import json
 
     from mpm.case import case_schema

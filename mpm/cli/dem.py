@@ -11,7 +11,10 @@ from mpm.cli.base import app
     add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True}
 )
 def dem(context: typer.Context) -> None:
-    """Simulate a vibrated powder bed and write its velocity profile (see mpm dem --help)."""
+    """Simulate a vibrated powder bed with particles, for the motion of a case.
+
+    mpm dem -h                                     its verbs
+    """
     from mpm.dem.cli import app as dem_app
 
     status = typer.main.get_command(dem_app).main(context.args, prog_name="mpm dem", standalone_mode=False)

@@ -14,7 +14,10 @@ from mpm.launcher import rank
 
 @app.command()
 def plot(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the directory of a run")]) -> None:
-    """Draw the pictures of a run into its plots/."""
+    """Draw the pictures of a run into its plots/.
+
+    mpm plot results/single_zone
+    """
     if rank() != 0:
         return
     from mpm.pictures import plot_run

@@ -25,7 +25,13 @@ def sweep(
         typer.Option("--scheduler", metavar="ADDRESS", help="a Dask scheduler's address, or slurm"),
     ] = None,
 ) -> None:
-    """Run, or go on with, a parameter sweep."""
+    """Run, or go on with, a parameter sweep.
+
+    mpm sweep cases/sweeps/dose.toml -j 4          four points at a time, into results/dose
+    mpm sweep dose.toml --scheduler slurm          through Slurm, see docs/cluster.md
+
+    The same command again goes on after an interruption and adds what an extended file asks for. The table is DIR/results.csv.
+    """
     if rank() != 0:
         return
     from mpm.sweep import run_sweep
@@ -47,7 +53,11 @@ def optimise(
     ] = None,
     settings: SetOption = None,
 ) -> None:
-    """Find the doses that titrate the solids with the least precursor and CVD."""
+    """Find the doses that titrate the solids with the least precursor and CVD.
+
+    mpm optimise single_cycle
+    mpm optimise single_cycle --target 0.95 --velocities -o results/lean
+    """
     from mpm.case import load_case
 
     loaded = load_case(case, parse_settings(settings))

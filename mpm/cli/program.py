@@ -20,6 +20,7 @@ from typing import Any, NoReturn
 import typer
 
 from mpm.cli.base import app
+from mpm.cli.help import missing
 from mpm.errors import InputError, Interrupted, MpmError, printable, storage_error
 from mpm.launcher import rank
 from mpm.screen import spell_out
@@ -47,9 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except (KeyboardInterrupt, typer.Abort):
             return _end(Interrupted.exit_status, "interrupted")
         except _USAGE_ERROR as error:
-            return _end(
-                InputError.exit_status, f"mpm: {error.format_message()} (mpm --help lists what there is)"
-            )
+            line = missing(error) or f"mpm: {error.format_message()} ({_where(error)} -h lists what there is)"
+            return _end(InputError.exit_status, line)
         except BrokenPipeError:  # the reader of our output has gone; let nothing more reach the pipe
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
@@ -61,6 +61,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 _USAGE_ERROR: Any = typer.BadParameter.__base__
+
+
+def _where(error: Any) -> str:
+    """The verb that somebody misused."""
+    return "mpm" if error.ctx is None else str(error.ctx.command_path)
 
 
 @contextmanager

@@ -2,12 +2,13 @@
 
 import json
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import typer
-from typer.core import TyperGroup
 
+from mpm.cli.help import HELP_NAMES, App, Verbs
 from mpm.errors import InputError
 from mpm.kinds import DEM_RUN, kind_of_directory, what_it_is
 from mpm.launcher import rank
@@ -22,20 +23,26 @@ SLIP = 0.01
 """Mean free path over diameter above which gas slips at the surface of a particle, and drag falls (Loth, 2.a.3: by 2 %)."""
 
 
-class RunByDefault(TyperGroup):
+class RunByDefault(Verbs):
     """`mpm dem X ...` means `mpm dem run X ...` unless X is a command."""
 
+    groups: ClassVar[Mapping[str, Sequence[str]]] = {}
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if args and args[0] not in self.commands and args[0] not in ("--help", "-h"):
+        if not args or args[0] not in {*self.commands, "--help", "-h"}:
             args = ["run", *args]
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(
+app = App(
     cls=RunByDefault,
     name="dem",
-    help="Bed velocity from particle simulations: mpm dem POWDER [-o DIR], mpm dem waveform DATA.csv.",
-    no_args_is_help=True,
+    context_settings=HELP_NAMES,
+    help="""Bed velocity from particle simulations.
+
+    mpm dem demo                   simulate a powder file, the same as mpm dem run
+    mpm dem waveform accelerometer.csv --unit g    a measured vibration as a section for one
+    """,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -62,7 +69,13 @@ def run(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an earlier run in DIR")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="no progress bar and no summary")] = False,
 ) -> None:
-    """Simulate a vibrated powder bed; write profile.csv, summary.json, maps and pictures."""
+    """Simulate a vibrated powder bed; write profile.csv, summary.json, maps and pictures.
+
+    mpm dem demo -o results/demo                   about a minute on two cores
+    mpm dem demo -o results/demo --resume --set run.cycles=12
+
+    A case reads the result: motion.profile = "results/demo/profile.csv".
+    """
     if resume and overwrite:
         raise InputError("mpm dem: --resume and --overwrite exclude each other")
     case = load_case(powder, parse_settings(settings, "box.stiffness='3 N/m'"))
@@ -150,7 +163,12 @@ def waveform(
     ] = 3,
     unit: Annotated[str, typer.Option(help="of the accelerations: m/s^2 or g")] = "m/s^2",
 ) -> None:
-    """Fit the largest harmonics of accelerometer data; write waveform.json, waveform.toml and a plot."""
+    """Fit the largest harmonics of accelerometer data; write waveform.json, waveform.toml and a plot.
+
+    mpm dem waveform accelerometer.csv --unit g -n 5
+
+    waveform.toml is a section for a powder file.
+    """
     record = read_record(data, unit)
     fitted, along, vertical = fit_record(record, harmonics)
     directory = output or Path("results") / data.stem
