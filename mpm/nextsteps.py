@@ -19,19 +19,18 @@ if TYPE_CHECKING:
     from mpm.case import Case
 
 
-def print_end(case: Case, summary: dict[str, Any], directory: Path, console: Console) -> None:
-    """What a finished run says: its numbers, what `mpm check` warns of, and what to type next."""
+def print_end(case: Case, summary: dict[str, Any], directory: Path, console: Console, reported: bool) -> None:
+    """What a finished run says: its numbers, what `mpm check` warns of, and what to type next; `reported`: its page is being written."""
     print_summary(summary, console, check_case(case)["warnings"])
-    print_next_steps(directory, summary, console)
+    print_next_steps(directory, summary, console, reported)
 
 
-def print_next_steps(directory: Path, summary: dict[str, Any], console: Console) -> None:
+def print_next_steps(directory: Path, summary: dict[str, Any], console: Console, reported: bool) -> None:
     """Name the commands that show a finished run and, where it has an end, the one that takes it further."""
     name = shlex.quote(str(directory))
-    steps = [
-        (f"mpm report {name}", "one page with everything, for a browser"),
-        (f"mpm plot {name}", "pictures, into its plots/"),
-    ]
+    steps = [(f"mpm plot {name}", "pictures, into its plots/")]
+    if not reported:
+        steps.insert(0, (f"mpm report {name}", "one page with everything, for a browser"))
     if summary.get("fidelity") != "steady":
         later = f"{2.0 * summary['simulated_seconds']:g} s"
         steps.append((f"mpm resume {name} --end '{later}'", "on to a later time"))

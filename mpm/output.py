@@ -3,12 +3,14 @@
 | file | content |
 |---|---|
 | `case.toml` | the resolved case, runnable again |
+| `origin.json` | which of its values were typed, and which are defaults |
 | `fields.pvd`, `fields/fields_000000.vtu` ... | all fields on one grid, one file per output time |
 | `phases.pvd`, `phases/phases_000000.vtu` ... | the last cycle phase by phase, where `output.phases` asks for it |
 | `history.csv` | one row per output time, first column `time` |
 | `summary.json` | the numbers of the finished run, SI units |
 | `flux.csv` | gas velocity through the upper face of every layer along x, mean of a cycle |
 | `checkpoint.npz` | restart state |
+| `report.html` | one page with everything, for a browser |
 | `run.log`, `plots/*.png` | log; pictures |
 
 Plain Python and numpy; the arrays that come in are global and in the grid's order. Files are replaced as a whole
@@ -43,6 +45,8 @@ if TYPE_CHECKING:
 log = logging.getLogger("mpm")
 OWN_FILES = (
     "case.toml",
+    "origin.json",
+    "report.html",
     "fields.pvd",
     "phases.pvd",
     "history.csv",
@@ -127,6 +131,15 @@ class RunDirectory:
     def write_case(self, text: str) -> None:
         """Write `case.toml`."""
         write_atomically(self.path / "case.toml", text)
+
+    def write_origin(self, origins: Mapping[str, str]) -> None:
+        """Write `origin.json`: where each value of `case.toml` comes from, by dotted key (`mpm.keys.Value.origin`)."""
+        write_atomically(self.path / "origin.json", json.dumps(origins, indent=1) + "\n")
+
+    def read_origin(self) -> dict[str, str]:
+        """Contents of `origin.json`; empty when there is none."""
+        path = self.path / "origin.json"
+        return load_json(path) if path.exists() else {}
 
     # ------------------------------------------------------------------ fields
 

@@ -25,6 +25,7 @@ from mpm.errors import ConvergenceError, InputError, Interrupted, StorageError, 
 from mpm.flownumbers import flux_profiles
 from mpm.geometry import Grid
 from mpm.history import Row, columns_of
+from mpm.keys import values
 from mpm.motion import BedMotion, step_motion
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, largest, on_root, total
@@ -51,12 +52,25 @@ Callback = Callable[["Reactor"], None]
 class Result:
     """What a run gives: `summary` (as summary.json), `history` (columns of history.csv), and fields of the last instant."""
 
-    def __init__(self, reactor: Reactor, summary: dict[str, Any]):
-        self.summary = summary
+    def __init__(self, reactor: Reactor, summary: dict[str, Any], directory: Path | None):
+        self.summary, self.directory = summary, directory
         self.history = reactor.history()
         self.field = reactor.field
         self.coverage = reactor.coverage
         self.grid = reactor.grid
+        self._comm = reactor.comm
+
+    def report(self, output: str | Path | None = None) -> Path:
+        """Write one page with everything about this run (`mpm report`), by default `report.html` of its directory; returns its path.
+
+        Collective; rank 0 writes. Raises InputError for a run that has not written its results (`run(output=...)`).
+        """
+        directory = self.directory
+        if directory is None:
+            raise InputError("report: this run has no directory; accepted: a result of run(output=...)")
+        from mpm.page import report
+
+        return on_root(self._comm, lambda: report(directory, output))
 
 
 class Reactor:
@@ -149,7 +163,7 @@ class Reactor:
                 raise
         summary = summarise(self, "done", self.wall)
         self._write_numbers(directory, summary)
-        return Result(self, summary)
+        return Result(self, summary, None if directory is None else directory.path)
 
     def _tell_lost_phases(self, bar: Progress) -> None:
         if self.phases_lost > 0:
@@ -183,6 +197,8 @@ class Reactor:
             if resume:
                 checkpoint.check_same_case(directory, self.case, state)
             directory.write_case(self.case.to_toml())
+            if not resume:  # a resumed case is the resolved one, in which everything is typed
+                directory.write_origin({value.name: value.origin for value in values(self.case)})
             return state
 
         state = on_root(self.comm, prepare)
@@ -256,7 +272,7 @@ class Reactor:
         self._write_numbers(directory, summary)
         if error is not None:
             raise error
-        return Result(self, summary)
+        return Result(self, summary, None if directory is None else directory.path)
 
     def _march(self, directory: RunDirectory | None, callback: Callback | None, bar: Progress) -> None:
         """All steps to the end of the case.

@@ -34,6 +34,8 @@ class Run:
     summary: Mapping[str, Any]
     steps: Sequence[tuple[float, str]]
     """Time [s] and file of the stored fields."""
+    origins: Mapping[str, str]
+    """Where each value of the case came from when the run was started, by dotted key (`mpm.keys.Value.origin`)."""
 
     @property
     def times(self) -> list[float]:
@@ -60,6 +62,12 @@ class Run:
             raise InputError(f"{self.directory.pvd}: no field {name!r}; there are {known}")
         return snapshot.cell_data[name].astype(float).reshape(self.grid.rows, self.grid.columns)
 
+    def report(self, output: str | Path | None = None) -> Path:
+        """Write one page with everything about this run (`mpm report`), by default its `report.html`; returns its path."""
+        from mpm.page import report
+
+        return report(self.directory.path, output)
+
 
 def load_run(directory: str | Path, say: Callable[[str], None] | None = None) -> Run:
     """Read a run's directory. Raises InputError when it is not one, or a file in it is damaged.
@@ -84,7 +92,8 @@ def load_run(directory: str | Path, say: Callable[[str], None] | None = None) ->
     history: dict[str, Floats] = unless_damaged(files.history, {})
     summary = unless_damaged(files.read_summary, None) or {}
     steps: list[tuple[float, str]] = unless_damaged(lambda: files.steps, [])
-    return Run(files, case, Grid.from_case(case), history, summary, steps)
+    origins: dict[str, str] = unless_damaged(files.read_origin, {})
+    return Run(files, case, Grid.from_case(case), history, summary, steps, origins)
 
 
 def fed_by(inlet: Inlet, species: Sequence[str]) -> list[str]:

@@ -22,6 +22,8 @@ from mpm.engineering import inlet_excess
 from mpm.flownumbers import flow_numbers
 from mpm.fronts import backflow, contamination, cvd_totals, film, fronts
 from mpm.geometry import Grid
+from mpm.parallel import on_root
+from mpm.revision import revision
 from mpm.versions import versions
 
 if TYPE_CHECKING:
@@ -43,6 +45,7 @@ def summarise(reactor: Reactor, status: str, wall: float) -> dict[str, Any]:
         "steps": reactor.steps,
         "simulated_seconds": reactor.time,
         "wall_seconds": wall,
+        "revision": on_root(reactor.comm, revision),
         "versions": versions(),
         "species": species_balances(case, totals),
         "sites": {"balance_error": site_balance(case, totals)},

@@ -57,7 +57,7 @@ def start(case: Path, directory: Path, ranks: int) -> subprocess.Popen[bytes]:
     launcher = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks)] if ranks > 1 else []
     way = "--resume" if (directory / "case.toml").exists() else "--overwrite"
     command = [
-        *launcher, sys.executable, "-m", "mpm", "run", str(case), "-o", str(directory), way, "--quiet",
+        *launcher, sys.executable, "-m", "mpm", "run", str(case), "-o", str(directory), way, "--quiet", "--no-report",
     ]  # fmt: skip
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     with open(directory.with_suffix(".err"), "wb") as errors:

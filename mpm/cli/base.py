@@ -55,9 +55,12 @@ def _options(
     ] = False,
 ) -> None:
     if version:
+        from mpm.revision import revision
         from mpm.versions import versions
 
-        found = versions()  # on every rank: it starts MPI, which waits for all of them
+        found = {
+            "revision": revision()
+        } | versions()  # on every rank: it starts MPI, which waits for all of them
         if rank() == 0:
             for name, number in found.items():
                 print(f"{name:<11}{number}")

@@ -1,4 +1,4 @@
-"""Verbs that look at what a run has left: plot."""
+"""Verbs that look at what a run has left: report, plot."""
 
 from __future__ import annotations
 
@@ -10,6 +10,31 @@ import typer
 
 from mpm.cli.base import app
 from mpm.launcher import rank
+
+
+@app.command()
+def report(
+    directories: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="a run; several runs, to compare; or a sweep")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="default: DIR/report.html")
+    ] = None,
+) -> None:
+    """Write one page with everything about a run, several runs or a sweep.
+
+    \b
+    mpm report results/single_zone                 results/single_zone/report.html
+    mpm report results/wide results/slow           both side by side, and their difference
+    mpm report results/map                         a sweep, whose points open their runs' pages
+
+    Open the file with a browser: it needs no network and can be sent as it is.
+    """
+    if rank() != 0:
+        return
+    from mpm.page import report as write
+
+    print(write(directories, output, lambda line: print(line, file=sys.stderr)))
 
 
 @app.command()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mpm.cli.base import CaseArgument, RunArgument, SetOption, app
-from mpm.errors import InputError
+from mpm.errors import InputError, MpmError
 from mpm.launcher import rank
 from mpm.screen import screen
 from mpm.settings import parse_settings
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mpm.case import Case
 
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="no progress line and no summary")]
+ReportOption = Annotated[bool, typer.Option("--no-report", help="do not write DIR/report.html at the end")]
 
 
 @app.command()
@@ -37,6 +38,7 @@ def run(
     settings: SetOption = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on from the restart state in DIR")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace an earlier run in DIR")] = False,
+    no_report: ReportOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Run a case and write its results into a directory.
@@ -66,7 +68,8 @@ def run(
         from mpi4py import MPI  # isort: skip  (after fem)
 
         directory = on_root(MPI.COMM_WORLD, lambda: make_numbered(Path(case).stem))
-    _compute(loaded, directory, resume, overwrite, quiet)
+    summary = _compute(loaded, directory, resume, overwrite, quiet)
+    _show(loaded, summary, directory, not no_report, quiet)
 
 
 @app.command()
@@ -75,6 +78,7 @@ def resume(
     end: Annotated[
         str | None, typer.Option(metavar="TIME", help="a later end than that of the case, e.g. '40 s'")
     ] = None,
+    no_report: ReportOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Go on with a run that was stopped, killed or has failed, or that is to run longer.
@@ -92,18 +96,41 @@ def resume(
     case = load_case(directory / "case.toml", {} if end is None else {"time.end": end})
     if end is not None and case.fidelity == "steady":
         raise InputError.at("resume", "--end", repr(end), "nothing: a steady state has no end", given="")
-    _compute(case, directory, True, False, quiet)
+    summary = _compute(case, directory, True, False, quiet)
+    _show(case, summary, directory, not no_report, quiet)
 
 
-def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: bool) -> None:
-    """Run `case` in `directory`, or go on there, and print what has come out."""
-    from mpm.nextsteps import how_to_go_on, print_end
+def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: bool) -> dict[str, Any]:
+    """Run `case` in `directory`, or go on there; returns the summary."""
+    from mpm.nextsteps import how_to_go_on
     from mpm.reactor import Reactor
     from mpm.rundirs import can_resume
 
     if resume and not can_resume(directory, case) and rank() == 0:
         print(f"{directory}: no restart state yet, so the run begins anew", file=sys.stderr)
     with how_to_go_on(directory):
-        result = Reactor(case).run(output=directory, resume=resume, overwrite=overwrite, progress=not quiet)
-    if rank() == 0 and not quiet:
-        print_end(case, result.summary, directory, screen())
+        return (
+            Reactor(case)
+            .run(output=directory, resume=resume, overwrite=overwrite, progress=not quiet)
+            .summary
+        )
+
+
+def _show(case: Case, summary: dict[str, Any], directory: Path, report: bool, quiet: bool) -> None:
+    """Print what has come out, and write the page; a page that cannot be written is no failure of the run."""
+    if rank() != 0:
+        return
+    from mpm.nextsteps import print_end
+
+    if not quiet:
+        print_end(case, summary, directory, screen(), report)
+    if report:
+        from mpm.page import report as write
+
+        try:
+            page = write(directory, say=lambda line: print(line, file=sys.stderr))
+        except (MpmError, OSError) as error:
+            print(f"no report: {error}", file=sys.stderr)
+            return
+        if not quiet:
+            print(f"Report: {page}")

@@ -6,7 +6,6 @@ rank. The compiled forms are shared by all points through the user's cache of do
 """
 
 import contextlib
-import hashlib
 import json
 import os
 import re
@@ -16,7 +15,6 @@ import sys
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -24,6 +22,7 @@ from typing import Any
 from mpm.case import load_case
 from mpm.errors import FULL, InputError, StorageError
 from mpm.files import write_atomically
+from mpm.revision import digest
 from mpm.sweep import guard
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.lease import Watch
@@ -53,24 +52,6 @@ PATIENCE = 60.0
 LAUNCHER_LINE = re.compile(
     r"=|\[(proxy|mpiexec)|Abort\(|application called MPI_Abort|YOUR APPLICATION|This typically|Please see the FAQ"
 )
-WITHOUT_NUMBERS = (
-    *("sweep", "dem", "cases"),
-    *("cli", "launcher.py", "settings.py", "screen.py", "tables.py", "caveats.py", "idle.py"),
-    *("quantities.py", "keys.py", "page"),
-    *(
-        "results.py",
-        "pictures.py",
-        "maps.py",
-        "outline.py",
-        "curves.py",
-        "streamlines.py",
-        "fieldnames.py",
-        "labels.py",
-        "optimise.py",
-    ),
-    *("compare.py",),
-)
-"""Parts of the package that change no number of a point: sweeps, particles, the command line, warnings, pictures."""
 NO_ROOM = 74
 """Exit status (EX_IOERR) in the record of a point that met a full disk."""
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -90,19 +71,9 @@ class Task:
     """Replaces `python -m mpm run`; then come CASE -o DIR and --resume or --overwrite."""
 
 
-@cache
 def program() -> str:
-    """Version of mpm and a digest of the sources that decide a point's numbers, e.g. "mpm 0.1.0 (3f2a9c01)".
-
-    The digest notices an edited working copy whose version number stayed. What changes no number, `WITHOUT_NUMBERS`, is left out of it.
-    """
-    package = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for file in sorted((*package.rglob("*.py"), *package.rglob("*.toml"))):
-        where = file.relative_to(package)
-        if where.parts[0] not in WITHOUT_NUMBERS:
-            digest.update(f"{where}\0".encode() + file.read_bytes())
-    return f"mpm {metadata.version('mpm')} ({digest.hexdigest()[:8]})"
+    """Version of mpm and a digest of the sources that decide a point's numbers, e.g. "mpm 0.1.0 (3f2a9c01)"."""
+    return f"mpm {metadata.version('mpm')} ({digest()})"
 
 
 def clean_environment(environment: Mapping[str, str]) -> dict[str, str]:
@@ -124,7 +95,7 @@ def command(task: Task, resume: bool) -> list[str]:
     """The full command of a point."""
     layout = Layout(Path(task.root))
     launcher = [mpirun(), "-n", str(task.ranks)] if task.ranks > 1 else []
-    what = task.command or (sys.executable, "-m", "mpm", "run", "--quiet")
+    what = task.command or (sys.executable, "-m", "mpm", "run", "--quiet", "--no-report")
     where = [str(layout.case(task.name)), "-o", str(layout.run(task.name))]
     return [*launcher, *what, *where, "--resume" if resume else "--overwrite"]
 

@@ -1,0 +1,158 @@
+"""What the page of several runs shows: changed keys and numbers side by side, the fields in one colour scale, and their difference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from mpm.compare import changed_keys, changed_numbers
+from mpm.errors import InputError
+from mpm.fieldnames import superscript
+from mpm.page.fields import DECADES, read_film, value_range
+from mpm.page.numbers import rounded
+from mpm.page.run_page import BUDGET, VALUES, RunPage, looks, run_page, viewer
+from mpm.page.write import render
+from mpm.quantities import Quantity, flatten
+from mpm.results import Run
+from mpm.tables import natural_scale
+
+MOST_RUNS = 6
+"""Beyond that a sweep says more than runs side by side."""
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A line of a table of runs: what it is, a text per run, and how far the others are from the first."""
+
+    label: str
+    meaning: str
+    unit: str
+    texts: Sequence[str]
+    values: Sequence[float | None]
+    relative: Sequence[str]
+
+
+@dataclass(frozen=True, eq=False)
+class ComparePage:
+    """Several runs, ready for the template; the first is what the others are compared with."""
+
+    runs: Sequence[RunPage]
+    names: Sequence[str]
+    keys: Sequence[Changed]
+    numbers: Sequence[Changed]
+    films: Sequence[dict[str, Any]]
+
+
+def compare_page(
+    directories: Sequence[str | Path], say: Callable[[str], None] = lambda text: None
+) -> ComparePage:
+    """Read the runs. Raises InputError when one is none, or when there are more than MOST_RUNS."""
+    if len(directories) > MOST_RUNS:
+        raise InputError.at(
+            "report",
+            "",
+            f"{len(directories)} runs",
+            f"at most {MOST_RUNS} side by side, or the directory of a sweep",
+        )
+    pages = [run_page(directory, say, fields=False) for directory in directories]
+    runs = [page.run for page in pages]
+    bounds = shared_bounds(runs)
+    films = [viewer(run, bounds, BUDGET // len(runs)) for run in runs if run.times]
+    return ComparePage(
+        runs=pages,
+        names=told_apart([page.run.directory.path.resolve() for page in pages]),
+        keys=key_table(runs),
+        numbers=number_table(runs),
+        films=[one for one in films if one is not None] if len(films) == len(runs) else [],
+    )
+
+
+def told_apart(paths: Sequence[Path]) -> list[str]:
+    """The shortest ends of the paths that differ from each other."""
+    for length in range(1, max(len(path.parts) for path in paths) + 1):
+        names = ["/".join(path.parts[-length:]) for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{path.name} ({number})" for number, path in enumerate(paths, start=1)]
+
+
+def shared_bounds(runs: Sequence[Run]) -> dict[str, tuple[float, float]]:
+    """One colour range for each field, that of all runs and times together."""
+    ends: dict[str, tuple[float, float]] = {}
+    for run in runs:
+        known = looks(run)
+        shown_fields = read_film(run, {name: make for name, (_, make) in known.items()}, VALUES)
+        for name, series in shown_fields.series.items():
+            look = known[name][0]
+            low, high = value_range(look, series)
+            if name in ends:
+                low, high = min(low, ends[name][0]), max(high, ends[name][1])
+            ends[name] = (high * 10.0**-DECADES if look.logarithmic else low, high)
+    return ends
+
+
+def key_table(runs: Sequence[Run]) -> list[Changed]:
+    """Keys of the resolved cases in which a run differs from the first."""
+    texts: dict[str, list[str]] = {}
+    for place, run in enumerate(runs[1:], start=1):
+        for change in changed_keys(runs[0].case, run.case):
+            line = texts.setdefault(change.key, [change.first or ""] * len(runs))
+            line[place] = change.second or ""
+    return [Changed(key, "", "", line, (), ()) for key, line in texts.items()]
+
+
+def number_table(runs: Sequence[Run]) -> list[Changed]:
+    """Reported numbers in which a run differs from the first by more than rounding."""
+    found: dict[tuple[str, str], Quantity] = {}
+    for run in runs[1:]:
+        for change in changed_numbers(runs[0].summary, run.summary):
+            found.setdefault((change.quantity.name, change.quantity.unit), change.quantity)
+    lines = []
+    for what in found.values():
+        reports = [_has(what, run.summary.get("fidelity") == "steady") for run in runs]
+        numbers = [flatten(run.summary) if has else {} for run, has in zip(runs, reports, strict=True)]
+        lines.append(_number_line(what, numbers))
+    return lines
+
+
+def _has(what: Quantity, steady: bool) -> bool:
+    """Whether a run of this kind reports the number in this unit: amounts of steady states are per second."""
+    return not what.rate or what.unit.endswith("/s") == steady
+
+
+def _number_line(what: Quantity, numbers: Sequence[Mapping[str, float]]) -> Changed:
+    """Values of one number in every run, and how far they are from the first; what is rounding in its run is 0."""
+    values = [found.get(what.name) for found in numbers]
+    texts = [
+        "" if value is None else rounded(what, value, natural_scale(what.name, dict(found)))
+        for value, found in zip(values, numbers, strict=True)
+    ]
+    first = values[0]
+    relative = [
+        ""
+        if value is None or not first or texts[0] == "0"
+        else f"{100.0 * (value - first) / abs(first):+.3g} %"
+        for value in values[1:]
+    ]
+    return Changed(
+        what.label, f"{what.meaning} ({what.name})", superscript(what.unit_shown), texts, values, relative
+    )
+
+
+def comparison_data(page: ComparePage) -> Mapping[str, Any]:
+    """For the page's script."""
+    same = all(a["x"] == b["x"] and a["y"] == b["y"] for a, b in pairwise(page.films))
+    return {"names": list(page.names), "films": list(page.films), "sameCells": same}
+
+
+def compare_html(page: ComparePage) -> str:
+    """The page of several runs as a file."""
+    return render(
+        "compare.html",
+        " and ".join(page.names),
+        {"charts": {}, "comparison": comparison_data(page)},
+        page=page,
+    )

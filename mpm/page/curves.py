@@ -1,0 +1,201 @@
+"""The curves of a page as traces and layouts of plotly: plain tables, drawn by its JavaScript in the reader's browser."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mpm.case import Case
+from mpm.outline import OKABE_ITO
+from mpm.quantities import quantity
+from mpm.results import Run
+
+MM = 1e3
+DECADES = 6.0
+"""Extent of a logarithmic axis below its largest value."""
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash")
+Chart = dict[str, Any]
+
+
+def chart(
+    title: str,
+    x: str,
+    y: str,
+    traces: Sequence[Mapping[str, Any]],
+    *,
+    logarithmic: bool = False,
+    x_range: Sequence[float] | None = None,
+    y_range: Sequence[float] | None = None,
+) -> Chart:
+    """A figure: `title`, titles of the axes with their units, traces; a logarithmic axis shows DECADES."""
+    across: dict[str, Any] = {"title": {"text": x}, "zeroline": False}
+    up: dict[str, Any] = {"title": {"text": y}, "zeroline": False}
+    if logarithmic:
+        up |= {"type": "log", "exponentformat": "power", "dtick": 1}
+        y_range = _decades(traces)
+    for axis, ends in ((across, x_range), (up, y_range)):
+        if ends is not None:
+            axis["range"] = list(ends)
+    return {"title": title, "data": list(traces), "layout": {"xaxis": across, "yaxis": up}}
+
+
+def _decades(traces: Sequence[Mapping[str, Any]]) -> tuple[float, float]:
+    """Ends of a logarithmic axis, as exponents."""
+    top = float(np.log10(max(value for one in traces for value in one["y"] if value is not None)))
+    return top - DECADES, top + 0.3
+
+
+def trace(x: Any, y: Any, name: str, colour: int = 0, dash: int = 0, **more: Any) -> dict[str, Any]:
+    """A line; what is not finite is a gap."""
+    values = [float(f"{v:.9g}") if np.isfinite(v) else None for v in np.asarray(y, float)]
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": [float(f"{v:.7g}") for v in np.asarray(x, float)],
+        "y": values,
+        "name": name,
+        "line": {"color": OKABE_ITO[colour % len(OKABE_ITO)], "dash": DASHES[dash % len(DASHES)], "width": 2},
+        **more,
+    }
+
+
+def curves(run: Run) -> list[Chart]:
+    """Everything of a run that is a curve, over time and along the strip."""
+    found: Iterable[Chart | None] = (
+        coating(run), outlets(run), growth(run), exit_profiles(run), flux(run)
+    )  # fmt: skip
+    return [one for one in found if one is not None]
+
+
+def _history(run: Run, pattern: str) -> dict[str, Any]:
+    if len(run.history.get("time", ())) < 2:
+        return {}
+    return {key: values for key, values in run.history.items() if re.fullmatch(pattern, key)}
+
+
+def coating(run: Run) -> Chart | None:
+    """Titration of every dosing inlet over time."""
+    found = _history(run, r"titration\..+\.(box_mean|exit_mean|exit_min)")
+    inlets = list(dict.fromkeys(key.split(".", 1)[1].rpartition(".")[0] for key in found))
+    words = {
+        "exit_mean": "leaving, mean",
+        "exit_min": "leaving, worst row",
+        "box_mean": "in the bed before the inlet",
+    }
+    traces = [
+        trace(
+            run.history["time"],
+            values,
+            f"{inlet}: {words[kind]}",
+            inlets.index(inlet),
+            list(words).index(kind),
+        )
+        for key, values in found.items()
+        for inlet, _, kind in [key.split(".", 1)[1].rpartition(".")]
+    ]
+    if not traces:
+        return None
+    return chart(
+        "Coverage that each inlet makes", "time [s]", "share of the sites", traces, y_range=[-0.03, 1.05]
+    )
+
+
+def outlets(run: Run) -> Chart | None:
+    """Mole fractions of all species in all outlets; those that are zero throughout are named in the title only."""
+    found = _history(run, r"outlets\..+\.x\..+")
+    species = list(run.case.mechanism.species_names)
+    names = [outlet.name for outlet in run.case.geometry.outlets]
+    traces = []
+    for key, values in found.items():
+        outlet, _, kind = key.removeprefix("outlets.").partition(".x.")
+        if kind in species and np.nanmax(values, initial=0.0) > 0.0:
+            label = kind if len(names) == 1 else f"{kind} in {outlet}"
+            traces.append(
+                trace(
+                    run.history["time"],
+                    np.where(values > 0.0, values, np.nan),
+                    label,
+                    species.index(kind),
+                    names.index(outlet) if outlet in names else 0,
+                )
+            )
+    if not traces:
+        return None
+    where = f" of {names[0]}" if len(names) == 1 else "s"
+    return chart(f"Gas in the outlet{where}", "time [s]", "mole fraction", traces, logarithmic=True)
+
+
+def growth(run: Run) -> Chart | None:
+    """Rate of the parasitic gas reactions over time."""
+    found = _history(run, r"cvd\.rate_mean")
+    if not any(np.nanmax(values, initial=0.0) > 0.0 for values in found.values()):
+        return None
+    what = quantity("cvd.rate_mean")
+    traces = [trace(run.history["time"], np.where(v > 0.0, v, np.nan), what.label, 1) for v in found.values()]
+    return chart(
+        "Parasitic growth in the gas", "time [s]", f"mean rate [{what.unit_shown}]", traces, logarithmic=True
+    )
+
+
+def exit_profiles(run: Run) -> Chart | None:
+    """Coverage over the height of the bed where it leaves each zone, at the end."""
+    rows = _conveyed_rows(run.case, run)
+    if rows is None:
+        return None
+    y = 0.5 * (run.grid.y[1:] + run.grid.y[:-1])[rows] * MM
+    traces = []
+    for index, (inlet, entry) in enumerate(run.summary.get("titration", {}).items()):
+        profile = entry.get("exit_profile", [])
+        if len(profile) == len(y):
+            traces.append(trace(profile, y, inlet, index) | {"mode": "lines+markers"})
+    if not traces:
+        return None
+    return chart(
+        "Coverage over the height of the bed where it leaves", "share of the sites", "height y [mm] (0: top of the bed)",
+        traces, x_range=[-0.03, 1.05],
+    )  # fmt: skip
+
+
+def _conveyed_rows(case: Case, run: Run) -> slice | None:
+    from mpm.diagnostics import conveyed_layer
+
+    name = conveyed_layer(case)
+    return None if name is None else run.grid.layer_rows(name)
+
+
+def flux(run: Run) -> Chart | None:
+    """Gas velocity through the upper face of every layer along x, from flux.csv."""
+    path = run.directory.path / "flux.csv"
+    if not path.is_file():
+        return None
+    with path.open(encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    if len(rows) < 3:
+        return None
+    columns = dict(zip(rows[0], np.array(rows[1:], float).T, strict=True))
+    x = columns.pop("x")
+    faces = [layer.name for layer in run.case.geometry.layers]
+    traces = [
+        trace(x * MM, values * 100.0, f"top of {name.removeprefix('velocity_y.')}", index)
+        for index, (name, values) in enumerate(columns.items())
+        if name.removeprefix("velocity_y.") in faces
+    ]
+    if not traces:
+        return None
+    largest = 100.0 * max(float(np.abs(values).max()) for values in columns.values())
+    lowest = 100.0 * min(float(values.min()) for values in columns.values())
+    ends = (
+        min(0.0, 1.05 * lowest),
+        1.05 * largest or 1.0,
+    )  # from zero: rounding must not look like a profile
+    return chart(
+        "Gas rising through the faces of the layers",
+        "x [mm]",
+        "superficial velocity [cm/s]",
+        traces,
+        y_range=ends,
+    )

@@ -1,0 +1,119 @@
+"""The numbers of a run as rows of words, value, unit and meaning, and the mass-balance sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mpm.fieldnames import superscript
+from mpm.quantities import Quantity, flatten, quantity
+from mpm.tables import ROUNDING, natural_scale
+
+GROUPS = (
+    ("What leaves coated", ("titration.",)),
+    ("What was dosed, what was used", ("dose_ratio.", "excess_number.", "utilisation.")),
+    ("Parasitic growth and precursor astray", ("cvd.", "contamination.")),
+    ("Film", ("film.",)),
+    ("Gas flow", ("flow.",)),
+    ("Gas in the outlets", ("outlets.",)),
+    ("Fronts", ("front.",)),
+    ("Time and cost", ("simulated_seconds", "wall_seconds", "steps", "cells", "ranks")),
+)
+"""Headings, and the dotted names below them."""
+BALANCE_ERRORS = ("balance_error", "mass_error")
+TWICE = ("flow.bed_pressure_drop", "flow.frit_pressure_drop")
+"""Also reported by the name of their layer."""
+TERMS = ("fed", "produced", "reacted", "left", "stored")
+"""Of a species' balance: fed + produced = reacted + left + stored."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number: what it is, SI value, and text with unit for people."""
+
+    quantity: Quantity
+    value: float
+    shown: str
+
+    @property
+    def name(self) -> str:
+        return self.quantity.name
+
+    @property
+    def unit(self) -> str:
+        """As people write it, with raised powers."""
+        return superscript(self.quantity.unit_shown)
+
+
+def shown(value: float, digits: int = 4) -> str:
+    """A number as people write it: thousands apart, powers of ten only where they are needed."""
+    if value == 0.0:
+        return "0"
+    if float(value).is_integer() and abs(value) < 1e9:
+        return f"{value:,.0f}"
+    return f"{value:.{digits}g}"
+
+
+def rounded(what: Quantity, value: float, scale: float) -> str:
+    """A value in the unit that people read; less than ROUNDING of `scale` is 0."""
+    return "0" if abs(value) <= ROUNDING * scale else shown(what.of(value))
+
+
+def row(name: str, value: float, steady: bool, scale: float = 0.0) -> Row:
+    """The row of one dotted name."""
+    what = quantity(name, steady)
+    return Row(what, value, rounded(what, value, scale))
+
+
+def groups(summary: Mapping[str, Any]) -> list[tuple[str, list[Row]]]:
+    """All numbers of a summary but balances and profiles, under their headings."""
+    steady = summary.get("fidelity") == "steady"
+    numbers = flatten(summary)
+    found = []
+    for title, prefixes in GROUPS:
+        rows = [
+            row(name, value, steady, natural_scale(name, numbers))
+            for name, value in numbers.items()
+            if name.startswith(prefixes)
+            and ".exit_profile." not in name
+            and not name.endswith(BALANCE_ERRORS)
+            and not (name in TWICE and "pressure_drop" in summary.get("flow", {}))
+        ]
+        if rows:
+            found.append((title, rows))
+    return found
+
+
+@dataclass(frozen=True)
+class Account:
+    """The balance of one species: its terms as rows and in per cent of what came in (fed + produced), and what is missing."""
+
+    species: str
+    rows: Sequence[Row]
+    shares: Sequence[str]
+    error: float
+
+
+def accounts(summary: Mapping[str, Any]) -> list[Account]:
+    """The sheet, species that never occurred left out."""
+    steady = summary.get("fidelity") == "steady"
+    found = []
+    for species, entry in summary.get("species", {}).items():
+        came = entry.get("fed", 0.0) + entry.get("produced", 0.0)
+        largest = max((abs(entry.get(term, 0.0)) for term in TERMS), default=0.0)
+        if largest == 0.0:
+            continue
+        rows = [row(f"species.{species}.{term}", entry.get(term, 0.0), steady, largest) for term in TERMS]
+        whole = came if came > 0.0 else largest
+        shares = ["" if r.shown == "0" else f"{100.0 * r.value / whole:.3g}" for r in rows]
+        found.append(Account(species, rows, shares, entry.get("balance_error", 0.0)))
+    return found
+
+
+def errors(summary: Mapping[str, Any]) -> list[Row]:
+    """Balance errors, the largest first."""
+    rows = [
+        row(name, value, False) for name, value in flatten(summary).items() if name.endswith(BALANCE_ERRORS)
+    ]
+    return sorted(rows, key=lambda r: -abs(r.value))

@@ -1,0 +1,311 @@
+"""The report pages: their numbers are the run's, they need no network, and in a browser they do what they show."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mpm import InputError, Reactor, load_case, load_run
+from mpm.cli import main
+from mpm.page import report
+from mpm.page.curves import curves
+from mpm.page.fields import DECADES, LEVELS, Look, chosen_times, encode, joined_edges, levels, value_of
+from mpm.page.run_page import run_page
+from mpm.page.strip import drawing
+from mpm.quantities import flatten
+from tests.cases import COARSE, SHORT
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+LARGEST = 10_000_000
+"""Bytes of a page, at most."""
+TITLE = 'A zone </script><b id="injected">& "quotes"'
+
+
+@pytest.fixture(scope="module")
+def zone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A coarse zone whose case types nothing but its mesh, a dose and a title that must be escaped."""
+    directory = tmp_path_factory.mktemp("report") / "zone"
+    changes = {**COARSE, **SHORT, "title": TITLE, "geometry.inlet.tma.mass_fractions.TMA": 1e-3}
+    Reactor(load_case("single_zone", changes)).run(directory)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def weaker(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with half the dose."""
+    directory = tmp_path_factory.mktemp("report") / "weaker"
+    changes = {**COARSE, **SHORT, "geometry.inlet.tma.mass_fractions.TMA": 5e-4}
+    Reactor(load_case("single_zone", changes)).run(directory)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def cycle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A coarse cycle of TMA and water."""
+    directory = tmp_path_factory.mktemp("report") / "cycle"
+    Reactor(load_case("single_cycle", {**COARSE, **SHORT})).run(directory)
+    return directory
+
+
+class Page:
+    """A page in a browser, with what it complained of."""
+
+    def __init__(self, browser: Any, path: Path):
+        self.page = browser.new_page(viewport={"width": 1300, "height": 900})
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(path.resolve().as_uri())
+        self.page.wait_for_function("document.body.dataset.ready", timeout=120_000)
+
+    def __call__(self, script: str) -> Any:
+        return self.page.evaluate(script)
+
+    def numbers(self) -> dict[str, float]:
+        """Every number on the page that says which it is."""
+        found = self(
+            "[...document.querySelectorAll('[data-name]')].map(e => [e.dataset.name, Number(e.dataset.value)])"
+        )
+        return dict(found)
+
+    def move(self, index: int) -> None:
+        """Set the time slider as a reader would, and wait for the picture."""
+        self(
+            f"(() => {{ const s = document.querySelector('.slider'); s.value = {index}; s.dispatchEvent(new Event('input')); }})()"
+        )
+        self.page.wait_for_function(
+            f"document.querySelector('.viewer').dataset.index == {index}", timeout=60_000
+        )
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    if BROWSER is None:
+        pytest.skip("no Chromium is installed")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
+        yield chromium
+        chromium.close()
+
+
+def alone(page: Page) -> bool:
+    """Whether the page complained of nothing and asked for nothing but itself."""
+    outside = [url for url in page.requests if not url.startswith(("file:", "blob:", "data:"))]
+    assert (page.complaints, outside, page("document.body.dataset.ready")) == ([], [], "yes")
+    return True
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("which", ["zone", "cycle"])
+def test_the_numbers_of_the_page_are_those_of_the_summary(
+    which: str, request: pytest.FixtureRequest, browser: Any
+) -> None:
+    """Fails when a number on the page is not in summary.json, a number of it is missing there, or the page is too large."""
+    directory: Path = request.getfixturevalue(which)
+    path = load_run(directory).report()
+    assert path == directory / "report.html" and path.stat().st_size < LARGEST
+    page = Page(browser, path)
+    assert alone(page)
+    summary = flatten(json.loads((directory / "summary.json").read_text()))
+    shown = page.numbers()
+    assert {name: summary[name] for name in shown} == shown
+    absent = {n for n, v in summary.items() if n not in shown and not n.startswith("versions") and v != 0.0}
+    assert {n for n in absent if ".exit_profile." not in n and not n.endswith("bed_pressure_drop")} <= {
+        "flow.frit_pressure_drop"
+    }
+
+
+@pytest.mark.browser
+def test_the_slider_moves_the_picture(zone: Path, browser: Any) -> None:
+    """Fails when another time shows the same fields, a colour range moves with it, or a value is not the file's."""
+    page = Page(browser, report(zone))
+    run = load_run(zone)
+    look = (
+        "(() => { const t = viewers[0].plots[1].data[0]; return [t.z.map(r => [...r]), t.zmin, t.zmax]; })()"
+    )
+    ranges = set()
+    for index in (0, 2, len(run.times) - 1):
+        page.move(index)
+        z, low, high = page(look)
+        ranges.add((low, high))
+        stored = run.field(run.snapshot(index), "x_TMA")
+        seen = stored > 10.0**low
+        shown = np.array(z, float)
+        assert shown.shape == stored.shape
+        assert (
+            np.abs(10.0 ** shown[seen] / stored[seen] - 1.0).max(initial=0.0)
+            < 0.5 * (10.0 ** (DECADES / LEVELS) - 1.0) + 1e-5
+        )
+        assert (shown[~seen] < low).all()
+    assert len(ranges) == 1
+    pictures = []
+    for index in (1, len(run.times) - 1):
+        page.move(index)
+        page.page.wait_for_timeout(200)
+        pictures.append(page.page.locator(".viewer .plot").first.screenshot())
+    assert pictures[0] != pictures[1]
+    assert alone(page)
+
+
+@pytest.mark.browser
+def test_every_field_streamlines_and_zoom_can_be_chosen(cycle: Path, browser: Any) -> None:
+    """Fails when a choice in a list draws something else or nothing."""
+    page = Page(browser, report(cycle))
+    names = page("viewers[0].fields.map(f => f.name)")
+    assert {"x_TMA", "x_H2O", "x_CH4", "velocity", "pressure"} <= set(names)
+    for name in names:
+        page(
+            f"(async () => {{ viewers[0].selects[0].value = {json.dumps(name)}; await viewers[0].draw(true); }})()"
+        )
+        assert page("viewers[0].plots[0].dataset.field") == name
+        assert page("viewers[0].plots[0].data.length") == 1
+    page("(async () => { viewers[0].streams.checked = true; await viewers[0].draw(true); })()")
+    assert page("viewers[0].plots[0].data[1].type") == "contour"
+    layers = load_run(cycle).case.geometry.layers
+    page(f"(() => {{ viewers[0].zoom.value = {len(layers) - 1}; viewers[0].look(); }})()")
+    low, high = page("viewers[0].plots[0].layout.yaxis.range")
+    assert high - low == pytest.approx(1e3 * layers[-2].height)
+    assert alone(page)
+
+
+@pytest.mark.browser
+def test_a_name_cannot_become_markup(zone: Path, browser: Any) -> None:
+    """Fails when a title of the case is taken for HTML or ends the script."""
+    page = Page(browser, report(zone))
+    assert page("document.title") == TITLE
+    assert page("document.querySelector('h1').textContent") == TITLE
+    assert page("document.getElementById('injected')") is None
+    assert page("document.getElementById('casefile').textContent") == (zone / "case.toml").read_text()
+
+
+@pytest.mark.browser
+def test_two_runs_side_by_side(zone: Path, weaker: Path, browser: Any) -> None:
+    """Fails when the page of two runs hides what was changed, uses two colour scales, or shows another difference."""
+    page = Page(browser, report([zone, weaker]))
+    assert alone(page)
+    keys = page("[...document.querySelectorAll('#keys td:first-child')].map(e => e.textContent)")
+    assert keys == ["geometry.inlet.tma.mass_fractions.TMA"]
+    shown = page(
+        "[...document.querySelectorAll('#numbers tr')].map(r => [...r.querySelectorAll('[data-value]')].map(e => Number(e.dataset.value)))"
+    )
+    summaries = [flatten(load_run(one).summary) for one in (zone, weaker)]
+    pair = [summaries[0]["excess_number.tma"], summaries[1]["excess_number.tma"]]
+    assert pair in shown
+    ranges = page("viewers[0].plots.slice(0, 2).map(p => [p.data[0].zmin, p.data[0].zmax])")
+    assert ranges[0] == ranges[1]
+    fields = [run.field(run.snapshot(-1), "theta_OAl(CH3)2") for run in map(load_run, (zone, weaker))]
+    porous = np.array([layer.material is not None for layer in load_run(zone).case.geometry.layers])
+    largest = np.abs(fields[1] - fields[0])[porous[load_run(zone).grid.row_layer]].max()
+    assert page("Number(viewers[0].plots[2].dataset.largest)") == pytest.approx(largest, abs=1.1 / LEVELS)
+    page.move(0)
+    assert page("Number(viewers[0].plots[2].dataset.largest)") == 0.0
+
+
+def test_defaults_are_marked_and_warnings_are_there(zone: Path) -> None:
+    """Fails when a value that nobody typed looks typed, or a warning of check is missing from the page."""
+    page = run_page(zone, fields=False)
+    origins = {one.key: one.origin for _, rows in page.inputs for one in rows}
+    assert origins["geometry.inlet.tma.mass_fractions.TMA"] == "typed"
+    assert (origins["geometry.periodic"], origins["motion.startup"]) == ("base", "default")
+    assert all(one.meaning for _, rows in page.inputs for one in rows)
+    html = report(zone).read_text()
+    assert '<td class="origin default">default</td>' in html
+    strip = drawing(load_run(zone).case)
+    assert (strip.periodic, strip.direction) == (True, 1)
+    assert all(sentence.replace("'", "&#39;") in html for sentence in page.warnings)
+
+
+def test_the_sheet_adds_up(cycle: Path) -> None:
+    """Fails when the shares of a species that comes and goes do not sum to what came."""
+    for account in run_page(cycle, fields=False).accounts:
+        terms = {row.name.split(".")[-1]: row.value for row in account.rows}
+        came = terms["fed"] + terms["produced"]
+        assert came == pytest.approx(terms["reacted"] + terms["left"] + terms["stored"], rel=1e-9)
+
+
+def test_curves_name_their_units_and_have_points(zone: Path) -> None:
+    """Fails when a curve has no points, or an axis with a dimension no unit."""
+    found = {one["title"]: one for one in curves(load_run(zone))}
+    assert "Coverage that each inlet makes" in found and "Gas rising through the faces of the layers" in found
+    for one in found.values():
+        assert all(len(trace["x"]) > 1 for trace in one["data"])
+        titles = [one["layout"][axis]["title"]["text"] for axis in ("xaxis", "yaxis")]
+        assert all("[" in t or t in ("share of the sites", "mole fraction") for t in titles)
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_levels_give_the_values_back(logarithmic: bool) -> None:
+    """Fails when encoding loses more than half a level, or what is not there comes back as a number."""
+    values = np.geomspace(1e-9, 2.0, 500).reshape(20, 25)
+    values[0, 0] = np.nan
+    low, high = (1e-6, 2.0) if logarithmic else (0.0, 2.0)
+    back = value_of(levels(values, low, high, logarithmic), low, high, logarithmic)
+    there = np.isfinite(values) & ((values >= low) if logarithmic else True)
+    step = np.log(high / low) / (LEVELS - 1) if logarithmic else 2.0 / (LEVELS - 1)
+    error = np.abs(np.log(back / values)) if logarithmic else np.abs(back - values)
+    assert error[there].max() <= 0.5 * step * (1.0 + 1e-9)
+    assert np.isnan(back[~there]).all()
+
+
+def test_times_that_are_alike_are_stored_once() -> None:
+    """Fails when a flow that does not change is carried once for every output."""
+    look = Look("pressure", "pressure", "Pa", 1.0, False, "Viridis")
+    field = np.arange(12.0).reshape(3, 4)
+    assert encode(look, [field, field, 2.0 * field, 2.0 * field]).frames == (0, 0, 1, 1)
+
+
+def test_joined_cells_keep_the_layers() -> None:
+    """Fails when joining cells would mix two layers, or drops the last edge."""
+    layer = np.array([0, 0, 0, 1, 1, 2])
+    assert joined_edges(np.arange(7.0), layer, 2).tolist() == [0, 2, 3, 5, 6]
+    assert chosen_times(10, 4) == [0, 3, 6, 9] and chosen_times(0, 4) == []
+
+
+def test_a_large_run_is_joined_and_says_so(zone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when a page grows with its run instead of staying within its budget."""
+    monkeypatch.setattr("mpm.page.run_page.BUDGET", 6_000)
+    monkeypatch.setattr("mpm.page.run_page.viewer.__defaults__", (None, 6_000))
+    page = run_page(zone)
+    assert page.viewer is not None and page.viewer["joined"] > 1
+    assert "are joined to one here" in page.note
+
+
+def test_run_ends_with_its_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when `mpm run` does not write the page as its last word, or writes one that was not wanted."""
+    monkeypatch.chdir(tmp_path)
+    coarse = [f"--set={key}={value}" for key, value in {**COARSE, "time.end": "0.2 s"}.items()]
+    assert main(["run", "single_zone", "-o", "here", *coarse]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "Report: here/report.html"
+    assert "Single TMA zone" in (tmp_path / "here/report.html").read_text()
+    assert main(["run", "single_zone", "-o", "there", "--no-report", *coarse]) == 0
+    assert "mpm report there" in capsys.readouterr().out
+    assert not (tmp_path / "there/report.html").exists()
+
+
+def test_what_is_no_run_is_refused(zone: Path, tmp_path: Path) -> None:
+    """Fails when a directory of another kind, or too many, give a traceback or an empty page."""
+    with pytest.raises(InputError, match="the directory of a run"):
+        report(tmp_path)
+    with pytest.raises(InputError, match="at most 6"):
+        report([zone] * 7)
+    with pytest.raises(InputError, match="cannot be written"):
+        report(zone, zone / "case.toml" / "report.html")
+
+
+def test_a_result_writes_its_page(tmp_path: Path) -> None:
+    """Fails when a result from Python has no page, or one without a directory pretends to."""
+    case = load_case("single_zone", {**COARSE, "time.end": "0.1 s"})
+    result = Reactor(case).run(tmp_path / "run")
+    assert result.report() == tmp_path / "run" / "report.html"
+    with pytest.raises(InputError, match="no directory"):
+        Reactor(case).run().report()
