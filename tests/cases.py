@@ -133,6 +133,7 @@ BOOKKEEPING = {
     "ranks",
     "wall_seconds",
     "versions",
+    "revision",
     "status",
     "title",
     "fidelity",

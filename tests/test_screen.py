@@ -227,8 +227,10 @@ def test_a_finished_run_names_the_next_steps(
     assert main(["run", "single_zone", "-o", "a run", *tiny]) == 0
     out = capfd.readouterr().out
     assert "warning: upwinding in columns" in out
-    steps = [shlex.split(line, comments=True) for line in out[out.index("Next:") :].splitlines()[1:]]
-    assert [step[:2] for step in steps] == [["mpm", "report"], ["mpm", "plot"], ["mpm", "resume"]]
+    *commands, last = out[out.index("Next:") :].splitlines()[1:]
+    assert last == f"Report: {Path('a run', 'report.html')}"
+    steps = [shlex.split(line, comments=True) for line in commands]
+    assert [step[:2] for step in steps] == [["mpm", "plot"], ["mpm", "resume"]]
     assert all("a run" in step for step in steps)
     assert main(steps[-1][1:]) == 0
     assert json.loads(Path("a run", "summary.json").read_text())["simulated_seconds"] == 0.2
