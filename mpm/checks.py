@@ -265,7 +265,7 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
         if kn > CONTINUUM:
             found.append(
                 f"layer {name}: Kn = {kn:.2g}, mean free path {_free_path(case) * 1e6:.2g} um over pores of "
-                f"{eng.pore_diameter(layers[name]) * 1e6:.3g} um: outside the continuum (above {CONTINUUM:g}) gas slips along the walls; "
+                f"{eng.pore_diameter(layers[name]) * 1e6:.3g} um: outside the continuum (Kn above {CONTINUUM:g}) gas slips at walls; "
                 f"permeability should be about 1 + 8 Kn = {1.0 + 8.0 * kn:.3g} times as large (Klinkenberg), D_eff smaller"
             )
     courant = report["run"].get("flow_courant", math.inf)
@@ -277,7 +277,7 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     if smeared > SMEARED and case.fidelity != "steady":
         otherwise = ", or fidelity averaged, which has no swinging gas" if case.fidelity == "resolved" else ""
         found.append(
-            f"upwinding in columns of {report['mesh']['column_width'] * 1e3:.3g} mm adds {100 * smeared:.2g} per cent to diffusion "
+            f"upwinding in columns of {report['mesh']['column_width'] * 1e3:.3g} mm adds {100 * smeared:.3g} per cent to diffusion "
             f"along the bed: narrower columns (geometry.cell_width){otherwise}"
         )
     slide = speed * Schedule.from_case(case).dt / report["mesh"]["column_width"]

@@ -113,7 +113,7 @@ QUANTITIES = (
     Quantity("cvd.total", "parasitic CVD, total", _AMOUNT, f"events of gas reactions over the run, {_DEPTH}", "umol/m", rate=True),
     Quantity("cvd.total_in_zone.<zone>", "parasitic CVD in {zone}", _AMOUNT,
         f"events of gas reactions over the run, {_DEPTH}", "umol/m", rate=True),
-    Quantity("contamination.<zone>.<species>", "{species} astray in {zone}", RATIO,
+    Quantity("contamination.<zone>.<species>", "share of the {species} that came over into {zone}", RATIO,
         "what has come over from other zones, over all of this species that has been fed"),
     Quantity("front.<inlet>.height", "height of the {inlet} front", "m",
         "y in the column of the inlet's centreline at which the precursor has fallen to half its feed (y = 0: top of the bed)", "mm"),

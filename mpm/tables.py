@@ -39,12 +39,9 @@ def print_mesh(case: Case, console: Console) -> None:
     for kind, port in [*(("inlet", p) for p in geometry.inlets), *(("outlet", p) for p in geometry.outlets)]:
         facets = int((grid.overlap(port) > 0.0).sum())
         ports.add_row(f"{kind} {port.name}", port.side, _mm(port.x0), _mm(port.x1), f"{facets}")
-    zero = (
-        "at the top of the moving layer"
-        if geometry.moving_layer is not None
-        else "at the bottom of the strip"
-    )
-    say(console, f"Layers, from top to bottom (y = 0 is {zero}), and zones, from left to right", style="bold")
+    zero = "top of the moving layer" if geometry.moving_layer is not None else "bottom of the strip"
+    heading = f"Layers, from top to bottom (heights count from the {zero}), and zones, from left to right"
+    say(console, heading, style="bold")
     regions.print(console)
     say(console, "Ports, from left to right", style="bold")
     ports.print(console)
