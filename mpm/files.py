@@ -115,9 +115,9 @@ def flush(path: Path) -> None:
 
 
 def write_picture(path: str | os.PathLike[str], figure: Any, **options: Any) -> None:
-    """Replace `path` by a matplotlib figure, as PNG, in one step."""
+    """Replace `path` by a matplotlib figure, in the format that its ending names, in one step."""
     content = io.BytesIO()
-    figure.savefig(content, format="png", **options)
+    figure.savefig(content, format=Path(path).suffix[1:].lower(), **options)
     write_atomically(path, content.getvalue())
 
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
 from matplotlib.contour import ContourSet
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import ScalarFormatter
@@ -41,16 +41,16 @@ def values_of(run: Run, snapshot: Snapshot, name: str) -> np.ma.MaskedArray:
     return np.ma.masked_where(np.broadcast_to(~reactive[:, None], found.shape), found)
 
 
+def ends_of(run: Run, snapshots: Iterable[Snapshot], name: str) -> tuple[float, float]:
+    """The least and the largest value of a field in all these snapshots [SI]."""
+    values = (values_of(run, snapshot, name) for snapshot in snapshots)
+    ends = [(float(one.min()), float(one.max())) for one in values if one.count()]
+    return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else (0.0, 0.0)
+
+
 def limits_of(run: Run, snapshots: Iterable[Snapshot], name: str) -> Limits:
     """The scale that holds a field of all these snapshots."""
-    ends = [
-        (float(v.min()), float(v.max()))
-        for v in (values_of(run, one, name) for one in snapshots)
-        if v.count()
-    ]
-    if not ends:
-        return Limits(0.0, 0.0, constant=True)
-    return colour_limits(field_name(name), min(low for low, _ in ends), max(high for _, high in ends))
+    return colour_limits(field_name(name), *ends_of(run, snapshots, name))
 
 
 def colours(entry: FieldName, limits: Limits) -> tuple[Colormap | str, Normalize]:
@@ -61,9 +61,9 @@ def colours(entry: FieldName, limits: Limits) -> tuple[Colormap | str, Normalize
     return entry.colours, LogNorm(low, high, clip=True) if limits.log else Normalize(low, high)
 
 
-def words_of(entry: FieldName, difference: bool = False) -> str:
+def words_of(entry: FieldName) -> str:
     """What a field is called, chemical formulas with subscripts."""
-    return ("difference in " if difference else "") + literal(entry.words).format(formula(entry.subject))
+    return literal(entry.words).format(formula(entry.subject))
 
 
 def in_unit(entry: FieldName, text: str, brackets: str = "{}") -> str:
@@ -187,16 +187,19 @@ def draw_layer(
 
 
 def scale_bar(
-    figure: Figure,
+    figure: FigureBase,
     mesh: QuadMesh,
     panels: Sequence[Axes],
     entry: FieldName,
     limits: Limits,
     values: Floats,
-    difference: bool = False,
+    prefix: str = "",
 ) -> None:
-    """The colour bar below the panels, or a sentence where the field is constant. Pointed ends say that values lie beyond."""
-    words = words_of(entry, difference)
+    """The colour bar below the panels, or a sentence where the field is constant. Pointed ends say that values lie beyond.
+
+    `values` are in `entry.unit_shown`; `prefix` comes before the words.
+    """
+    words = prefix + words_of(entry)
     if limits.constant:
         value = f"{0.5 * (limits.low + limits.high) / entry.factor:.4g}"
         figure.supxlabel(f"{words}, constant: {in_unit(entry, value)}", fontsize=9)

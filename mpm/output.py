@@ -11,7 +11,7 @@
 | `flux.csv` | gas velocity through the upper face of every layer along x, mean of a cycle |
 | `checkpoint.npz` | restart state |
 | `report.html` | one page with everything, for a browser |
-| `run.log`, `plots/*.png` | log; pictures |
+| `run.log`, `plots/*` | log; pictures and movies |
 
 Plain Python and numpy; the arrays that come in are global and in the grid's order. Files are replaced as a whole
 (`mpm.files.write_atomically`) and tables grow in place (`mpm.history`, `mpm.vtu`), so a run killed at any moment leaves a directory that
@@ -55,7 +55,7 @@ OWN_FILES = (
     "checkpoint.npz",
 )
 OWN_PATTERNS = (
-    *("fields/fields_*.vtu", "phases/phases_*.vtu", "plots/*.png"),
+    *("fields/fields_*.vtu", "phases/phases_*.vtu", "plots/*.png", "plots/*.gif", "plots/*.mp4"),
     *("*.tmp", "fields/*.tmp", "phases/*.tmp", "plots/*.tmp"),
 )
 META = "__meta__"

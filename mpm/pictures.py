@@ -148,7 +148,7 @@ def pictures(
     """What there is to draw, and how; of a chosen `time` [s] the maps alone."""
     if not run.times and any(run.directory.path.glob("fields/*.vtu")):
         say(f"{run.directory.pvd}: missing or damaged, no maps without it")
-    snapshot = fields.last() if time is None else run.snapshot(nearest_index(run, time))
+    snapshot = fields.last() if time is None else snapshot_at(run, time)
     if snapshot is not None:
         yield from maps(run, snapshot, "" if time is None else at_time(run, snapshot))
     if time is not None:
@@ -203,7 +203,7 @@ def draw_field(
     `clim`: ends of the colour scale in the unit of its label. Raises InputError for a field that is not there (with the nearest name) and
     a run without stored fields.
     """
-    snapshot = run.snapshot(-1 if time is None else nearest_index(run, time))
+    snapshot = snapshot_at(run, time)
     with style.context(STYLE):
         return map_figure(
             run, snapshot, field, None if clim is None else chosen_limits(field, clim), streamlines
@@ -217,11 +217,11 @@ def chosen_limits(field: str, clim: tuple[float, float]) -> Limits:
     return Limits(low * entry.factor, high * entry.factor, log=entry.scale == "log" and low > 0.0)
 
 
-def nearest_index(run: Run, time: float) -> int:
-    """Number of the stored time nearest to `time` [s]."""
+def snapshot_at(run: Run, time: float | None) -> Snapshot:
+    """The stored fields nearest to `time` [s]; the last without one. Raises InputError when there are none, or they cannot be read."""
     if not run.times:
         raise InputError(f"{run.directory.pvd}: no fields have been written")
-    return int(np.argmin(np.abs(np.asarray(run.times) - time)))
+    return run.snapshot(-1 if time is None else int(np.argmin(np.abs(np.asarray(run.times) - time))))
 
 
 def at_time(run: Run, snapshot: Snapshot) -> str:

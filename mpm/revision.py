@@ -14,6 +14,7 @@ WITHOUT_NUMBERS = (
     *("launcher.py", "settings.py", "screen.py", "tables.py", "checkscreen.py", "sketch.py", "nextsteps.py"),
     *("caveats.py", "idle.py", "quantities.py", "keys.py", "schema.py", "verdict.py", "compare.py"),
     *("results.py", "pictures.py", "maps.py", "outline.py", "curves.py", "labels.py", "fieldnames.py"),
+    *("drawing.py", "beside.py", "movie.py"),
     *("streamlines.py", "optimise.py", "revision.py"),
 )
 """Parts of the package that change no number of a run: sweeps, particles, the command line, warnings, pictures."""

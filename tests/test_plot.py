@@ -72,12 +72,12 @@ def write_run(path: Path, case: Case, times: np.ndarray = TIMES) -> Run:
 
 @pytest.fixture
 def zone(tmp_path: Path) -> Run:
-    return write_run(tmp_path / "zone", load_case("single_zone", {"geometry.cell_width": "2 mm"}))
+    return write_run(tmp_path / "zone", load_case("single_zone", {"geometry.cell_width": "5 mm"}))
 
 
 @pytest.fixture
 def cycle(tmp_path: Path) -> Run:
-    return write_run(tmp_path / "cycle", load_case("single_cycle", {"geometry.cell_width": "2 mm"}))
+    return write_run(tmp_path / "cycle", load_case("single_cycle", {"geometry.cell_width": "5 mm"}))
 
 
 def meshes(axes: Axes) -> list[QuadMesh]:
@@ -298,7 +298,7 @@ def test_plot_run_writes_every_picture(cycle: Run) -> None:
     names += ["exit_profile", "history", "outlets"]
     assert [path.stem for path in paths] == names and {path.parent.name for path in paths} == {"plots"}
     for path in paths:
-        pixels = (imread(path)[..., :3] * 255).astype(int)
+        pixels = (imread(path)[::5, ::5, :3] * 255).astype(int)
         assert len(np.unique(pixels @ [65536, 256, 1])) > 20
 
 
@@ -447,7 +447,7 @@ def test_what_is_no_run_is_refused_by_what_it_is(tmp_path: Path, what: str) -> N
         "nothing": "no such",
         "file": "a file",
         "empty": "without case.toml",
-        "sweep": "points/",
+        "sweep": "a sweep",
         "dem": "mpm dem",
     }
     with pytest.raises(InputError, match=words[what]):

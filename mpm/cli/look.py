@@ -10,6 +10,7 @@ import typer
 
 from mpm.cli.base import app
 from mpm.launcher import rank
+from mpm.screen import say, screen
 
 
 @app.command()
@@ -38,20 +39,66 @@ def report(
 
 
 @app.command()
-def plot(directory: Annotated[Path, typer.Argument(metavar="DIR", help="the directory of a run")]) -> None:
-    """Draw the pictures of a run into its plots/.
+def plot(
+    directories: Annotated[
+        list[Path],
+        typer.Argument(metavar="DIR...", help="a run, several runs to put beside each other, or a sweep"),
+    ],
+    field: Annotated[
+        str | None,
+        typer.Option(
+            "--field", metavar="NAME", help="one field of fields.pvd, such as x_TMA, theta_OH, pressure"
+        ),
+    ] = None,
+    time: Annotated[
+        str | None,
+        typer.Option(
+            "--time",
+            metavar="T",
+            help="the stored time nearest to T, in s or with a unit (default: the last)",
+        ),
+    ] = None,
+    clim: Annotated[
+        str | None,
+        typer.Option("--clim", metavar="LO,HI", help="ends of the colour scale, in the unit it shows"),
+    ] = None,
+    streamlines: Annotated[
+        bool, typer.Option("--streamlines", help="draw the gas's streamlines over the field")
+    ] = False,
+    movie: Annotated[
+        bool, typer.Option("--movie", help="all stored times, as GIF; with -o FILE.mp4 as MP4")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="default: in plots/ of the run")
+    ] = None,
+) -> None:
+    """Draw a run, runs beside each other, or a sweep.
 
+    Without options the standard pictures of a run, into its plots/: coverage, precursors, gas, curves.
+
+    \b
     mpm plot results/single_zone
+    mpm plot results/single_zone --field velocity --streamlines
+    mpm plot results/single_zone --field x_TMA --time 1.5 --clim 1e-6,1e-4
+    mpm plot results/single_zone --movie
+    mpm plot results/wide results/slow --field pressure
     """
     if rank() != 0:
         return
-    from mpm.pictures import plot_run
+    from mpm.drawing import Wish, draw, parse_clim, parse_time
 
-    paths = plot_run(directory, lambda line: print(line, file=sys.stderr))
-    for path in paths:
-        print(path)
-    if not paths:
-        print(
-            f"{directory}: holds nothing that is drawn: no fields of species or coverage, no history",
-            file=sys.stderr,
-        )
+    wish = Wish(
+        field=field,
+        time=None if time is None else parse_time(time),
+        clim=None if clim is None else parse_clim(clim),
+        streamlines=streamlines,
+        movie=movie,
+        output=output,
+    )
+    drawn = draw(directories, wish, lambda line: print(line, file=sys.stderr))
+    console = screen()
+    for path, words in drawn.items():
+        say(console, f"{path}: {words}")
+    if not drawn:
+        nothing = "holds nothing that is drawn: no fields of species or coverage, no history"
+        print(f"{directories[0]}: {nothing}", file=sys.stderr)

@@ -192,7 +192,7 @@ def _drive(
         return INTERRUPTED
     for name in results.missing_columns():
         say(f"no finished point reports {name}")
-    draw(results)
+    draw(layout.root)
     settled = counts["done"] + counts["failed"] + counts["bad_input"]
     return 0 if counts["done"] and settled == len(results.points) else INCOMPLETE
 

@@ -1,22 +1,30 @@
-"""Pictures of a sweep: lines over one axis, a heat map with contours over two, parallel coordinates beyond.
+"""Pictures of a sweep, drawn from its results.csv and sweep.json alone.
 
-One PNG per chosen number in plots/. Axes carry the unit that the sweep file writes, numbers their SI unit. Points
-without a result leave a gap: a cross at the foot of a line, a hatched cell of a map, no line among the coordinates.
+Lines over one axis, a map of coloured cells over two, parallel coordinates beyond: one PNG per chosen number in plots/. Axes carry the
+unit that the sweep file writes, numbers their words and unit of `mpm.quantities`. Points without a result leave a gap that a legend
+explains: a cross at the foot of a line, a hatched cell of a map; they are counted below parallel coordinates.
 """
 
+import csv
+import io
 import math
-from collections.abc import Sequence
+import textwrap
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mpm.errors import InputError
+from mpm.fieldnames import superscript
 from mpm.files import file_name, write_picture
 from mpm.labels import literal
+from mpm.quantities import Quantity, quantity
+from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
-from mpm.sweep.results import Results
-from mpm.sweep.sweepfile import Axis
+from mpm.sweep.sweepfile import DEFAULT_PICTURES
 from mpm.sweep.table import choose
 
 if TYPE_CHECKING:
@@ -25,6 +33,10 @@ if TYPE_CHECKING:
 
 LOGARITHMIC_FROM = 20.0
 """Ratio of the largest to the smallest level from which a positive axis is drawn logarithmically."""
+ROOM = {"x": 0.14, "y": 0.06}
+"""Part of an axis that the label of a tick takes."""
+NUMBERS_UP_TO = 150
+"""Cells of a map that still have room for their values."""
 
 
 @dataclass(frozen=True)
@@ -37,26 +49,51 @@ class Scale:
     logarithmic: bool
 
 
-def scale(axis: Axis, numbers: Sequence[float | str]) -> Scale:
-    """The points' values on one axis in the unit of the sweep file."""
-    name = axis.name if "." not in axis.name else ".".join(axis.name.split(".")[-2:])
-    if any(isinstance(number, str) for number in numbers):
-        words = tuple(dict.fromkeys(map(str, numbers)))
-        places = np.array([words.index(str(number)) for number in numbers], float)
+def scale(axis: Mapping[str, Any], values: Sequence[str]) -> Scale:
+    """One axis of sweep.json with the points' values of results.csv, in the unit of the sweep file."""
+    name, unit = words_of(axis), axis["written_unit"]
+    if axis["kind"] == "word":
+        words = tuple(dict.fromkeys(values))
+        places = np.array([words.index(value) for value in values], float)
         return Scale(literal(name), places, tuple(map(literal, words)), False)
-    positions = np.array(numbers, float) / factor(axis.unit)
+    positions = np.array(values, float) / factor(unit)
     wide = positions.min() > 0 and positions.max() / positions.min() >= LOGARITHMIC_FROM
-    label = literal(f"{name} [{axis.unit}]" if axis.unit else name)
-    return Scale(label, positions, (), bool(positions.min() > 0 and (axis.logarithmic or wide)))
+    label = literal(f"{name} [{unit}]" if unit else name)
+    return Scale(label, positions, (), bool(positions.min() > 0 and (axis["logarithmic"] or wide)))
+
+
+def words_of(axis: Mapping[str, Any]) -> str:
+    """An axis as people say it: its key without the table (`inlet tma velocity`), after the name that the sweep file chose."""
+    key = " ".join(axis["keys"][0].split(".")[1:]).replace("_", " ") or axis["keys"][0]
+    return key if axis["name"] in axis["keys"] else f"{axis['name']} ({key})"
 
 
 def dress(axes: "Axes", which: str, scale: Scale) -> None:
-    """Label, scale and ticks of the x or y direction."""
+    """Label, scale and ticks of the x or y direction: ticks at levels of the sweep, as many as have room for their labels."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
     getattr(axes, f"set_{which}label")(scale.label)
     if scale.words:
         getattr(axes, f"set_{which}ticks")(range(len(scale.words)), scale.words)
-    elif scale.logarithmic:
+        return
+    if scale.logarithmic:
         getattr(axes, f"set_{which}scale")("log")
+    levels = np.unique(scale.positions)
+    shown = spaced(np.log(levels) if scale.logarithmic else levels, ROOM[which])
+    direction = getattr(axes, f"{which}axis")
+    direction.set_major_locator(FixedLocator(list(levels[shown])))
+    direction.set_minor_locator(NullLocator())
+    direction.set_major_formatter(lambda value, _: f"{value:.4g}")
+
+
+def spaced(places: np.ndarray, part: float) -> list[int]:
+    """Which of the sorted places get a label: the first, the last, and those between that keep this part of the axis from each other."""
+    room = part * (places[-1] - places[0])
+    shown = [0]
+    for index in range(1, len(places) - 1):
+        if places[index] - places[shown[-1]] >= room and places[-1] - places[index] >= room:
+            shown.append(index)
+    return [*shown, len(places) - 1] if len(places) > 1 else shown
 
 
 def line(figure: "Figure", x: Scale, values: np.ndarray, label: str) -> None:
@@ -67,14 +104,8 @@ def line(figure: "Figure", x: Scale, values: np.ndarray, label: str) -> None:
     missing = ~np.isfinite(values)
     if missing.any():
         foot = axes.get_xaxis_transform()
-        axes.plot(
-            x.positions[missing],
-            np.full(missing.sum(), 0.02),
-            "x",
-            color="tab:red",
-            transform=foot,
-            label="no result",
-        )
+        height = np.full(missing.sum(), 0.02)
+        axes.plot(x.positions[missing], height, "x", color="tab:red", transform=foot, label="no result")
         axes.legend()
     dress(axes, "x", x)
     axes.set_ylabel(label)
@@ -90,8 +121,11 @@ def edges(levels: np.ndarray, logarithmic: bool) -> np.ndarray:
 
 
 def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: str) -> None:
-    """One number over two axes, with contour lines where there are enough neighbours."""
-    from matplotlib.patheffects import AbstractPathEffect, withStroke
+    """One number over two axes: a cell for each point in the colour of its value, which is written into it where there is room."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    from mpm.maps import PLAIN
 
     columns, rows = np.unique(x.positions), np.unique(y.positions)
     field = np.full((len(rows), len(columns)), np.nan)
@@ -99,18 +133,27 @@ def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: st
     axes = figure.add_subplot()
     dress(axes, "x", x)
     dress(axes, "y", y)
-    axes.patch.set(hatch="////", facecolor="0.85", edgecolor="0.6")
-    field = np.ma.masked_invalid(field)
+    hatched: dict[str, Any] = {"hatch": "////", "facecolor": "0.85", "edgecolor": "0.6"}
+    axes.patch.set(**hatched)
+    shown = np.ma.masked_invalid(field)
     across, up = edges(columns, x.logarithmic), edges(rows, y.logarithmic)
-    mesh = axes.pcolormesh(across, up, field, cmap="viridis")
-    figure.colorbar(mesh, ax=axes, label=label)
-    if not (x.words or y.words) and np.ptp(field.compressed()) > 0:
-        lines = axes.contour(columns, rows, field, colors="white", linewidths=0.8)
-        # legible on the light end of the map, too
-        outline: list[AbstractPathEffect] = [withStroke(linewidth=2, foreground="0.2")]
-        lines.set_path_effects(outline)
-        for text in axes.clabel(lines, fontsize="small"):
-            text.set_path_effects(outline)
+    constant = np.ptp(shown.compressed()) == 0.0
+    colours = ListedColormap([PLAIN]) if constant else "viridis"
+    mesh = axes.pcolormesh(across, up, shown, cmap=colours, edgecolors="white", linewidth=0.3)
+    if constant:
+        axes.set_title(f"{label}: {shown.compressed()[0]:.4g} everywhere", fontsize="medium")
+    else:
+        figure.colorbar(mesh, ax=axes, label=label)
+    if shown.mask.any():
+        key = Patch(label="no result (failed, not finished, or not in the sweep)", **hatched)
+        figure.legend(handles=[key], loc="outside lower center", fontsize="small", frameon=False)
+    if field.size <= NUMBERS_UP_TO and not constant:
+        for row, column in zip(*np.nonzero(np.isfinite(field)), strict=True):
+            bright = float(np.asarray(mesh.norm(field[row, column]))) > 0.6
+            axes.text(
+                columns[column], rows[row], f"{field[row, column]:.3g}", ha="center", va="center",
+                color="black" if bright else "white", fontsize=8 if len(columns) <= 8 else 6,
+            )  # fmt: skip
     axes.set(xlim=across[[0, -1]], ylim=up[[0, -1]])
 
 
@@ -141,51 +184,82 @@ def parallel_coordinates(figure: "Figure", scales: Sequence[Scale], values: np.n
     norm = Normalize(values[order[0]], values[order[-1]])
     colours = colormaps["viridis"](norm(values[order]))
     axes.add_collection(LineCollection(paths, colors=colours, linewidths=1.2, alpha=0.8))
-    figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, label=label)
+    if norm.vmin == norm.vmax:
+        axes.set_title(f"{label}: {norm.vmin:.4g} everywhere", fontsize="medium")
+    else:
+        figure.colorbar(ScalarMappable(norm, "viridis"), ax=axes, label=label)
+    if len(present) < len(values):
+        figure.supxlabel(f"not drawn: {len(values) - len(present)} points without a result", fontsize="small")
     axes.set(xlim=(-0.3, len(scales) - 0.7), ylim=(-0.12, 1.12), yticks=[])
-    axes.set_xticks(range(len(scales)), [one.label.replace(" [", "\n[") for one in scales])
+    axes.set_xticks(range(len(scales)), [textwrap.fill(one.label.replace(" [", "\n["), 18) for one in scales])
     axes.spines[:].set_visible(False)
 
 
-def draw(results: Results) -> list[Path]:
-    """Write plots/<number>.png for every chosen number that a finished point has; returns the files."""
-    rows, units, sweep = results.rows(), results.columns(), results.sweep
+def draw(directory: Path) -> dict[Path, str]:
+    """Write plots/<number>.png for every chosen number that a finished point has; returns what each file shows.
+
+    Raises InputError when `directory` holds no table of a sweep.
+    """
+    about, rows = read_files(directory)
+    columns = {name: item["unit"] for name, item in about["columns"].items()}
+    taken = {"status", "error", "point", *(axis["name"] for axis in about["axes"])}
     names = [
         name
-        for name in choose(sweep.pictures, units)
-        if name in units
-        and any(isinstance(row.get(name), int | float) for row in rows)
-        and name not in {axis.name for axis in sweep.axes}
+        for name in choose(chosen(about), columns)
+        if name in columns and name not in taken and any(row[name] for row in rows)
     ]
     if not names:
-        return []
+        return {}
     from matplotlib.figure import Figure
 
-    scales = [
-        scale(axis, [point.numbers[index] for point in results.points])
-        for index, axis in enumerate(sweep.axes)
-    ]
+    scales = [scale(axis, [row[axis["name"]] for row in rows]) for axis in about["axes"]]
     free = [one for one in scales if len(np.unique(one.positions)) > 1] or scales[:1]
-    directory = results.layout.root / "plots"
-    directory.mkdir(exist_ok=True)
-    files = []
+    folder = Path(directory) / "plots"
+    folder.mkdir(exist_ok=True)
+    drawn = {}
     for name in names:
-        values = np.array([number(row.get(name)) for row in rows])
-        label = literal(f"{name} [{units[name]}]" if units[name] not in ("", "1") else name)
-        figure = Figure(figsize=(6.4, 4.8), layout="constrained")
-        if len(free) == 1 or sweep.mode == "zip":
+        found = with_unit(name, columns[name])
+        values = np.array([found.of(float(row[name])) if row[name] else math.nan for row in rows])
+        unit = f" [{superscript(found.unit_shown)}]" if found.unit_shown else ""
+        label = "\n".join(textwrap.wrap(literal(found.label + unit), 52))
+        figure = Figure(figsize=(6.8, 5.0), layout="constrained")
+        if len(free) == 1 or about["mode"] == "zip":
             line(figure, free[0], values, label)
-        elif len(free) == 2 and sweep.mode == "grid":
+        elif len(free) == 2 and about["mode"] == "grid":
             heat_map(figure, free[0], free[1], values, label)
         else:
             parallel_coordinates(figure, free, values, label)
-        figure.suptitle(literal(sweep.title), fontsize="medium")
-        file = directory / f"{file_name(name)}.png"
-        write_picture(file, figure, dpi=150)
-        files.append(file)
-    return files
+        figure.suptitle(literal(f"{about['title']} [{Path(directory).resolve().name}]"), fontsize="medium")
+        path = folder / f"{file_name(name)}.png"
+        write_picture(path, figure, dpi=150)
+        drawn[path] = f"{found.label}{unit} over {', '.join(words_of(axis) for axis in about['axes'])}"
+    return drawn
 
 
-def number(value: Any) -> float:
-    """A cell of the table as a float; NaN when it is empty."""
-    return float(value) if isinstance(value, int | float) else math.nan
+def read_files(directory: Path) -> tuple[dict[str, Any], list[dict[str, str]]]:
+    """sweep.json and the rows of results.csv. Raises InputError when one is missing or they do not belong together."""
+    layout = Layout(Path(directory))
+    about, table = read_json(layout.root / "sweep.json"), layout.root / "results.csv"
+    if not about or not table.exists():
+        raise InputError.at(
+            directory, "", "a sweep without sweep.json and results.csv", "what `mpm sweep` left when it ended"
+        )
+    rows = list(csv.DictReader(io.StringIO(table.read_text(encoding="utf-8"))))
+    if not rows or any(None in row.values() or set(about["columns"]) - row.keys() for row in rows):
+        raise InputError.at(
+            table, "", "a table that is cut or is not of this sweep.json", "the table that `mpm sweep` wrote"
+        )
+    return about, rows
+
+
+def chosen(about: Mapping[str, Any]) -> Sequence[str]:
+    """Which numbers the sweep file wants drawn."""
+    table = tomllib.loads(about["text"])["sweep"]
+    found = table.get("pictures", table.get("columns", DEFAULT_PICTURES))
+    return [found] if isinstance(found, str) else list(found)
+
+
+def with_unit(name: str, unit: str) -> Quantity:
+    """The quantity of a column whose unit in sweep.json is `unit`: that of a steady state where amounts are per second."""
+    found = quantity(name)
+    return found if found.unit == unit else quantity(name, steady=True)
