@@ -1,5 +1,6 @@
 """The report pages: their numbers are the run's, they need no network, and in a browser they do what they show."""
 
+import csv
 import json
 import shutil
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from mpm.page.fields import DECADES, LEVELS, Look, chosen_times, encode, joined_
 from mpm.page.run_page import run_page
 from mpm.page.strip import drawing
 from mpm.quantities import flatten
-from tests.cases import COARSE, SHORT
+from tests.cases import COARSE, SHORT, TINY
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 LARGEST = 10_000_000
@@ -49,6 +50,21 @@ def cycle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("report") / "cycle"
     Reactor(load_case("single_cycle", {**COARSE, **SHORT})).run(directory)
     return directory
+
+
+@pytest.fixture(scope="module")
+def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two doses times two bed speeds of a tiny zone."""
+    folder = tmp_path_factory.mktemp("report")
+    settings = {**TINY, "time.end": "0.2 s", "time.step": "0.1 s"}
+    (folder / "map.toml").write_text(
+        '[sweep]\ncase = "single_zone"\ntitle = "Dose and speed"\nmode = "grid"\n'
+        '[[sweep.axis]]\nkey = "geometry.inlet.tma.mass_fractions.TMA"\nvalues = [1e-4, 2e-4]\n'
+        '[[sweep.axis]]\nkey = "motion.bed_velocity"\nvalues = ["1 cm/s", "2 cm/s"]\n[sweep.set]\n'
+        + "".join(f"{json.dumps(key)} = {json.dumps(value)}\n" for key, value in settings.items())
+    )
+    assert main(["sweep", str(folder / "map.toml"), "-o", str(folder / "map"), "-j", "2"]) == 0
+    return folder / "map"
 
 
 class Page:
@@ -207,6 +223,38 @@ def test_two_runs_side_by_side(zone: Path, weaker: Path, browser: Any) -> None:
     assert page("Number(viewers[0].plots[2].dataset.largest)") == pytest.approx(largest, abs=1.1 / LEVELS)
     page.move(0)
     assert page("Number(viewers[0].plots[2].dataset.largest)") == 0.0
+
+
+@pytest.mark.browser
+def test_points_of_a_sweep_open_their_runs(sweep: Path, browser: Any) -> None:
+    """Fails when a map of a sweep shows other numbers than its table, or a point does not lead to the page of its run."""
+    page = Page(browser, report(sweep))
+    assert alone(page)
+    rows = list(csv.DictReader((sweep / "results.csv").open()))
+    name = page("viewers[0].plots[0].dataset.number")
+    assert name in rows[0]
+    trace = page(
+        "(() => { const t = viewers[0].plots[0].data[0]; return [t.type, t.x, t.y, t.z, t.customdata]; })()"
+    )
+    kind, doses, speeds, values, pages = trace
+    assert (kind, doses, speeds) == ("heatmap", [1e-4, 2e-4], [1.0, 2.0])
+    for row in rows:
+        i = speeds.index(pytest.approx(100.0 * float(row["motion.bed_velocity"])))
+        j = doses.index(float(row["geometry.inlet.tma.mass_fractions.TMA"]))
+        assert values[i][j] == pytest.approx(float(row[name]), rel=1e-5)
+        assert pages[i][j] == f"points/{row['point']}/report.html"
+    page(
+        "viewers[0].plots[0].open({ points: [{ customdata: viewers[0].plots[0].data[0].customdata[1][0] }] })"
+    )
+    page.page.wait_for_function(
+        "document.body.dataset.ready && document.getElementById('strip')", timeout=60_000
+    )
+    assert page.page.url.endswith(pages[1][0])
+    page.page.go_back()
+    page.page.wait_for_function("document.body.dataset.ready", timeout=60_000)
+    links = page("[...document.querySelectorAll('#points a')].map(a => a.getAttribute('href'))")
+    assert links == [f"points/{row['point']}/report.html" for row in rows]
+    assert all((sweep / link).is_file() for link in links)
 
 
 def test_defaults_are_marked_and_warnings_are_there(zone: Path) -> None:

@@ -284,12 +284,92 @@ class Comparison {
   }
 }
 
+// A sweep: two charts, each of one number over what was varied.
+class Explorer {
+  constructor(element, sweep) {
+    this.sweep = sweep;
+    this.plots = [...element.querySelectorAll(".plot")];
+    this.numbers = [...element.querySelectorAll(".number")];
+    this.across = [...element.querySelectorAll(".across")];
+    this.scales = [...element.querySelectorAll(".scale")];
+    const titled = (one) => (one.unit ? `${one.label} [${one.unit}]` : one.label);
+    this.titled = titled;
+    for (const [which, select] of this.numbers.entries()) {
+      sweep.numbers.forEach((one, i) => select.add(new Option(titled(one), i)));
+      const other = sweep.numbers.findIndex((one) => one.name.split(".")[0] !== sweep.numbers[0].name.split(".")[0]);
+      select.selectedIndex = which && other > 0 ? other : Math.min(which, sweep.numbers.length - 1);
+    }
+    for (const select of this.across) sweep.axes.forEach((axis, i) => select.add(new Option(axis.label, i)));
+    for (const select of [...this.numbers, ...this.across, ...this.scales]) select.onchange = () => this.draw();
+    for (const plot of this.plots) {
+      plot.open = (event) => { const page = event.points[0].customdata; if (typeof page === "string" && page) location.href = page; };
+    }
+  }
+
+  async draw() {
+    for (const which of this.plots.keys()) {
+      const plot = this.plots[which], number = this.sweep.numbers[this.numbers[which].selectedIndex];
+      const along = this.across.length ? this.across[which].selectedIndex : 0;
+      const logarithmic = this.scales[which].value === "log";
+      const map = this.sweep.grid && this.sweep.axes.length === 2;
+      const traces = map ? [this.map(number, along, logarithmic)] : this.lines(number, along);
+      const x = this.sweep.axes[along], y = map ? this.sweep.axes[1 - along] : null;
+      const axis = (one) => ({ title: { text: this.titled(one) }, type: typeof one.values[0] === "string" ? "category" : one.log ? "log" : "linear", zeroline: false, exponentformat: "power" });
+      const up = map ? axis(y) : { title: { text: this.titled(number) }, type: logarithmic ? "log" : "linear", zeroline: false, exponentformat: "power" };
+      await Plotly.react(plot, traces, { margin: { l: 70, r: 20, t: 30, b: 48 }, font: FONT, xaxis: axis(x), yaxis: up, hovermode: "closest", legend: { orientation: "h", y: 1.02, yanchor: "bottom" } }, CONFIG);
+      if (!plot.dataset.listens) { plot.on("plotly_click", plot.open); plot.dataset.listens = "yes"; }
+      plot.dataset.number = number.name;
+    }
+  }
+
+  // All axes of a point and its number, for the pointer.
+  words(index, number) {
+    const axes = this.sweep.axes.map((axis) => `${axis.label} ${axis.values[index]} ${axis.unit}`);
+    const value = number.values[index];
+    return [`<b>${value === null ? "no result" : Number(value.toPrecision(4))} ${number.unit}</b>`, ...axes].join("<br>");
+  }
+
+  map(number, along, logarithmic) {
+    const levels = this.sweep.axes.map((axis) => [...new Set(axis.values)].sort((a, b) => (typeof a === "string" ? 0 : a - b)));
+    const [across, up] = [levels[along], levels[1 - along]];
+    const make = (fill) => up.map(() => across.map(() => fill));
+    const z = make(null), text = make(""), pages = make("");
+    number.values.forEach((value, index) => {
+      const column = across.indexOf(this.sweep.axes[along].values[index]), row = up.indexOf(this.sweep.axes[1 - along].values[index]);
+      z[row][column] = value === null ? null : logarithmic ? Math.log10(value) : value;
+      text[row][column] = this.words(index, number);
+      pages[row][column] = this.sweep.pages[index];
+    });
+    return {
+      type: "heatmap", x: across, y: up, z, text, customdata: pages, hovertemplate: "%{text}<extra></extra>", colorscale: "Viridis", xgap: 1, ygap: 1,
+      colorbar: { title: { text: (logarithmic ? "log10 of " : "") + this.titled(number), side: "right" }, thickness: 14 },
+    };
+  }
+
+  // One line for each combination of the other axes of a grid; points alone of a sample.
+  lines(number, along) {
+    const { axes, grid } = this.sweep, groups = new Map();
+    number.values.forEach((value, index) => {
+      const name = grid ? axes.filter((_, i) => i !== along).map((axis) => `${axis.label} ${axis.values[index]} ${axis.unit}`).join(", ") : "";
+      if (!groups.has(name)) groups.set(name, []);
+      groups.get(name).push(index);
+    });
+    return [...groups].map(([name, indices]) => {
+      const sorted = [...indices].sort((a, b) => (typeof axes[along].values[a] === "string" ? 0 : axes[along].values[a] - axes[along].values[b]));
+      return {
+        type: "scatter", mode: grid || axes.length === 1 ? "lines+markers" : "markers", name, showlegend: groups.size > 1, marker: { size: 9 },
+        x: sorted.map((i) => axes[along].values[i]), y: sorted.map((i) => number.values[i]), text: sorted.map((i) => this.words(i, number)),
+        customdata: sorted.map((i) => this.sweep.pages[i]), hovertemplate: "%{text}<extra></extra>",
+      };
+    });
+  }
+}
+
 function drawCharts() {
   for (const place of document.querySelectorAll(".chart")) {
     const chart = data.charts[place.dataset.chart];
     const layout = { margin: { l: 68, r: 12, t: 30, b: 42 }, font: FONT, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" }, showlegend: true, ...chart.layout };
     Plotly.newPlot(place, chart.data, layout, CONFIG);
-    place.on("plotly_click", (event) => { const page = event.points[0].customdata; if (typeof page === "string") location.href = page; });
   }
 }
 
@@ -300,6 +380,7 @@ async function start() {
   drawCharts();
   window.viewers = Object.entries(data.viewers || {}).map(([id, film]) => new Viewer(document.getElementById(id), film));
   if (data.comparison && data.comparison.films.length) window.viewers.push(new Comparison(document.getElementById("comparison"), data.comparison));
+  if (data.sweep && data.sweep.numbers.length) window.viewers.push(new Explorer(document.getElementById("explorer"), data.sweep));
   await Promise.all(window.viewers.map((viewer) => viewer.draw(true)));
   document.body.dataset.ready = "yes";
 }

@@ -7,8 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mpm.files import file_name
+from mpm.kinds import SWEEP_RUN, kind_of_directory
 from mpm.page.compare_page import compare_html, compare_page
 from mpm.page.run_page import run_html, run_page
+from mpm.page.sweep_page import sweep_html, sweep_page
 from mpm.page.write import write_page
 
 log = logging.getLogger("mpm")
@@ -27,6 +29,10 @@ def report(
     """
     paths = [Path(directories)] if isinstance(directories, str | Path) else [Path(one) for one in directories]
     if len(paths) == 1:
+        if kind_of_directory(paths[0]) is SWEEP_RUN:
+            return write_page(
+                Path(output) if output else paths[0] / NAME, sweep_html(sweep_page(paths[0], say))
+            )
         page = run_page(paths[0], say)
         return write_page(Path(output) if output else paths[0] / NAME, run_html(page))
     several = compare_page(paths, say)
