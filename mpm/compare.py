@@ -7,20 +7,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from mpm.errors import InputError, printable
+from mpm.keys import values
 from mpm.quantities import Quantity, flatten, quantity
+from mpm.screen import Sheet, say, together
+from mpm.tables import ROUNDING, TWICE, natural_scale
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from mpm.case import Case
+    from mpm.results import Run
 
 SAME = 1e-6
 """Relative difference below which two numbers are the same: nobody acts on a part in a million."""
 CLOSED = 1e-9
 """The same of two balance errors, absolute."""
-NOTHING = 1e-12
-"""Share of the largest number of the same kind below which a number is rounding of 0."""
 _ABOUT_THE_COMPUTER = ("wall_seconds", "ranks")
 _ERRORS = ("balance_error", "mass_error")
 
@@ -68,17 +73,18 @@ def changed_numbers(
 ) -> list[ChangedNumber]:
     """Numbers of two summaries that differ by more than `SAME`, in the order of the first.
 
-    What tells about the computer (time on the clock, processes) and profiles row by row are left out. `everything`: all numbers, whether
-    they differ or not. An amount of a steady state is per second, so that a steady run and one in time share only numbers of other kinds.
+    What tells about the computer (time on the clock, processes), what is there twice, and profiles row by row are left out. `everything`:
+    all numbers, whether they differ or not. An amount of a steady state is per second, so that a steady run and one in time share only
+    numbers of other kinds.
     """
     one, other = (_numbers(summary) for summary in (first, second))
     found = []
     for name, steady in [*one, *(key for key in other if key not in one)]:
         a, b = one.get((name, steady)), other.get((name, steady))
         if not everything:
-            if name in _ABOUT_THE_COMPUTER or name.rpartition(".")[0].endswith("_profile"):
+            if name in (*_ABOUT_THE_COMPUTER, *TWICE) or name.rpartition(".")[0].endswith("_profile"):
                 continue
-            if _same_number(name, a, b, _scale(name, one, other)):
+            if _same_number(name, a, b, _scale(name, first, second)):
                 continue
         found.append(ChangedNumber(quantity(name, steady), a, b))
     return found
@@ -126,20 +132,63 @@ def _numbers(summary: Mapping[str, Any]) -> dict[tuple[str, bool], float]:
     }
 
 
-def _scale(name: str, *runs: Mapping[tuple[str, bool], float]) -> float:
-    """The largest number of the same section and unit: what rounding is measured by."""
-    section, unit = name.partition(".")[0], quantity(name).unit
-    alike = (
-        abs(v)
-        for run in runs
-        for (n, _), v in run.items()
-        if n.partition(".")[0] == section and quantity(n).unit == unit
-    )
-    return max(alike, default=0.0)
+def _scale(name: str, *summaries: Mapping[str, Any]) -> float:
+    """What a number of several runs is large or small beside (`natural_scale`)."""
+    return max(natural_scale(name, flatten(summary)) for summary in summaries)
 
 
 def _same_number(name: str, one: float | None, other: float | None, scale: float) -> bool:
     if one is None or other is None:
         return False
-    floor = CLOSED if name.endswith(_ERRORS) else NOTHING * scale
+    floor = CLOSED if name.endswith(_ERRORS) else ROUNDING * scale
     return abs(one - other) <= max(SAME * max(abs(one), abs(other)), floor)
+
+
+def print_comparison(one: Run, other: Run, everything: bool, console: Console) -> None:
+    """Two runs side by side: what was changed, and what came of it. Raises InputError for one that has not ended."""
+    for letter, run in (("A", one), ("B", other)):
+        if not run.summary:
+            raise InputError(
+                f"{run.directory.path}: found no summary.json; accepted: a run that has ended (mpm watch shows one at work)"
+            )
+        title = f" ({printable(run.case.title)})" if run.case.title else ""
+        status = "" if run.summary.get("status") == "done" else f", {run.summary.get('status')}"
+        say(console, f"{letter}: {run.directory.path}{title}{status}")
+    keys = changed_keys(one.case, other.case)
+    numbers = changed_numbers(one.summary, other.summary, everything)
+    people = [{value.name: value.text for value in values(run.case)} for run in (one, other)]
+    sheet = Sheet(room=34)
+    sheet.group("Keys that differ, A -> B")
+    for change in keys:
+        texts = (
+            texts.get(change.key, raw)
+            for texts, raw in zip(people, (change.first, change.second), strict=True)
+        )
+        sheet.add(change.key, " -> ".join(together(text or "none") for text in texts))
+    sheet.group("Numbers, A -> B" if everything else "Numbers that differ, A -> B")
+    for number in numbers:
+        sheet.add(
+            number.quantity.label, _beside(number, _scale(number.quantity.name, one.summary, other.summary))
+        )
+    sheet.print(console)
+    if not keys:
+        say(console, "The cases are the same.")
+    if not numbers:
+        say(console, "The numbers are the same, to one part in a million.")
+
+
+def _beside(changed: ChangedNumber, scale: float) -> str:
+    """Both values with their unit, 0 for what is rounding beside `scale`, and how much the second is more or less than the first."""
+    values = [
+        0.0 if value is not None and abs(value) < ROUNDING * scale else value
+        for value in (changed.first, changed.second)
+    ]
+    texts = ["none" if value is None else f"{changed.quantity.of(value):.4g}" for value in values]
+    text = together(f"{' -> '.join(texts)} {changed.quantity.unit_shown}".strip())
+    relative = replace(changed, first=values[0], second=values[1]).relative
+    return text if not relative else f"{text} ({together(_more(relative))})"
+
+
+def _more(relative: float) -> str:
+    """A relative difference in words: `+12 %`, `-3.1 %`, `25 times as much`."""
+    return f"{100.0 * relative:+.3g} %" if abs(relative) < 10.0 else f"{1.0 + relative:.3g} times as much"

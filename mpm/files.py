@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 from mpm.errors import InputError
 
+LATELY = 120.0
+"""Seconds after its last words for which a log without locks counts as one that is being written."""
 LONGEST_NAME = 200
 """Bytes of a part of a file's name; file systems take 255 in all."""
 _OTHER_MARKS = {
@@ -185,3 +187,17 @@ def lock(path: Path, patience: float = 0.0) -> IO[bytes]:
         except OSError:
             log.warning("%s: no locks on this file system; take care that one process works here", path)
             return stream
+
+
+def locked(path: Path) -> bool:
+    """Whether a process has the `lock` on `path`; without locks on the file system, whether it has been written to lately."""
+    try:
+        with open(path, "rb") as stream:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    except OSError:
+        return time.time() - path.stat().st_mtime < LATELY
+    return False

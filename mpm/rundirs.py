@@ -51,10 +51,10 @@ def make_numbered(stem: str) -> Path:
         raise InputError(f"{RESULTS}: cannot be used for results ({error.strerror})") from error
 
 
-def require_run(path: Path) -> None:
-    """Raise InputError where there is no run that could go on."""
+def require_run(path: Path, complaint: str = "nothing to resume") -> None:
+    """Raise InputError, with the `complaint`, where there is no run."""
     if kind_of_directory(path) is not RUN:
-        raise InputError.at(path, "", f"nothing to resume: {what_it_is(path)}", RUN.words)
+        raise InputError.at(path, "", f"{complaint}: {what_it_is(path)}", RUN.words)
 
 
 def can_resume(path: Path, case: Case) -> bool:

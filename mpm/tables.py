@@ -65,7 +65,7 @@ _GROUPS = (
 """Sections of summary.json in the order in which people ask for them."""
 _FIRST = ("exit_mean", "exit_min", "exit_std", "box_mean")
 """Order of the numbers of an inlet's titration."""
-_TWICE = ("flow.bed_pressure_drop", "flow.frit_pressure_drop")
+TWICE = ("flow.bed_pressure_drop", "flow.frit_pressure_drop")
 """Names kept for scripts; flow.pressure_drop.<layer> says the same."""
 
 
@@ -77,7 +77,7 @@ def print_summary(summary: dict[str, Any], console: Console, warnings: Sequence[
     for heading, sections in _GROUPS:
         sheet.group(heading)
         for name in sorted(_of(numbers, sections), key=lambda name: _place(name, sections)):
-            if name in _TWICE and any(other.startswith("flow.pressure_drop.") for other in numbers):
+            if name in TWICE and any(other.startswith("flow.pressure_drop.") for other in numbers):
                 continue
             if name != "flow.mass_error":
                 sheet.add(quantity(name, steady).label, shown(name, numbers, steady))

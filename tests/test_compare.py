@@ -1,10 +1,14 @@
 """Two runs beside each other: what counts as a difference."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from mpm.case import Case
+from mpm.cli import main
 from mpm.compare import changed_keys, changed_numbers
+from mpm.output import RunDirectory
 
 from .cases import TINY, zone
 
@@ -81,3 +85,46 @@ def test_amounts_per_second_are_not_compared_with_amounts() -> None:
         (2e-6, None, "mol/m"),
         (None, 2e-6, "mol/m/s"),
     ]
+
+
+def written(directory: Path, case: Case, summary: dict[str, Any] | None) -> str:
+    run = RunDirectory(directory)
+    run.prepare()
+    run.write_case(case.to_toml())
+    if summary is not None:
+        run.write_summary(summary)
+    run.release()
+    return str(directory)
+
+
+def test_two_runs_side_by_side(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when `mpm compare` does not show both values of what differs with unit and difference, shows what is the same without being
+    asked, or takes a run that has no numbers yet."""
+    monkeypatch.chdir(tmp_path)
+    case = zone(mesh=TINY)
+    one = written(Path("one"), case, SUMMARY)
+    other = written(
+        Path("two"),
+        case.with_({"motion.bed_velocity": "8 mm/s"}),
+        changed(
+            species={"TMA": {"fed": 3e-6, "stored": 1e-22, "balance_error": 1e-13}},
+            flow={"bed_superficial_velocity": [0.01, 0.02], "mass_error": 1e-15},
+        ),
+    )
+    assert main(["compare", one, other]) == 0
+    text = capsys.readouterr().out
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    assert lines[:2] == ["A: one (Single TMA zone)", "B: two (Single TMA zone)"]
+    assert "motion.bed_velocity 1.3 cm/s -> 0.8 cm/s" in lines
+    assert "TMA fed 2 -> 3 umol/m (+50 %)" in lines
+    assert "superficial gas velocity in the bed, along 0 -> 1 cm/s" in lines
+    assert "upwards" not in text and "balance" not in text and "profile" not in text
+    assert main(["compare", one, other, "--all"]) == 0
+    everything = capsys.readouterr().out
+    assert "upwards" in everything and "row 1 from below" in everything and "computing time" in everything
+    assert main(["compare", one, one]) == 0
+    assert "The cases are the same.\nThe numbers are the same" in capsys.readouterr().out
+    assert main(["compare", one, written(Path("young"), case, None)]) == 2
+    assert "young: found no summary.json; accepted: a run that has ended" in capsys.readouterr().err

@@ -1,16 +1,25 @@
 """What the documentation tells people to type works as printed."""
 
+import json
+import os
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from mpm.case import load_case
 from mpm.checks import check_case
+from mpm.cli import main
 from mpm.geometry import Grid
 from mpm.output import RunDirectory
 from mpm.settings import parse_settings
+
+from .cases import TINY
 
 ROOT = Path(__file__).parent.parent
 
@@ -28,6 +37,61 @@ def test_first_case_of_the_readme_is_valid(tmp_path: Path) -> None:
     tma = next(inlet for inlet in case.geometry.inlets if inlet.name == "tma")
     assert tma.width == pytest.approx(8e-3) and tma.mass_fractions == {"TMA": 1e-4}
     assert case.geometry.length == pytest.approx(0.1397) and case.motion.bed_velocity == pytest.approx(0.008)
+
+
+def steps_of_the_readme() -> list[tuple[str, str]]:
+    """What a newcomer does, in the order of the text: (kind, content) of case files to save, commands to type and programs to run."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    found = re.finditer(
+        r"^```(toml|python)\n(.*?)^```|^    ((?:make|mpm|mpirun) [^\n]*)$", text, re.DOTALL | re.MULTILINE
+    )
+    return [("command", match[3]) if match[3] else (match[1], match[2]) for match in found]
+
+
+def test_steps_of_the_readme_work_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], mpirun: Any
+) -> None:
+    """Fails when a command or program of the README, typed in the order of the text in an empty directory, does not end well.
+
+    Meshes are coarse and times short; `make demo` is what it runs.
+    """
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}:{os.environ['PATH']}")
+    layers = ", ".join(
+        f'{{ name = "{key.split(".")[2]}", cells = {number} }}'
+        for key, number in TINY.items()
+        if "layer" in key
+    )
+    coarse = f'cell_width = "{TINY["geometry.cell_width"]}"\nlayer = [{layers}]\n'
+    done = []
+    for kind, content in steps_of_the_readme():
+        if kind == "toml":
+            case = content.replace("[geometry]\n", f"[geometry]\n{coarse}").replace(
+                'end = "20 s"', 'end = "1 s"'
+            )
+            assert case.count("\n") == content.count("\n") + 2 and 'end = "1 s"' in case
+            Path("wide_port.toml").write_text(case, encoding="utf-8")
+        elif kind == "python":
+            subprocess.run([sys.executable, "-c", content], check=True, timeout=120)
+        else:
+            words = shlex.split(content, comments=True)
+            if words[0] == "make":
+                options = [part for key, value in TINY.items() for part in ("--set", f"{key}={value}")]
+                words = ["mpm", "run", "single_zone", "-q", "--set", "time.end=1 s", *options]
+                if content.split()[1] != "demo":
+                    continue
+            if words[0] == "mpm":
+                assert main(words[1:]) == 0, f"{content}: {capfd.readouterr().err}"
+            else:
+                subprocess.run(
+                    [str(Path(sys.executable).with_name(words[0])), *words[1:]], check=True, timeout=120
+                )
+            done.append(words[1] if words[0] == "mpm" else words[0])
+    assert {"check", "run", "watch", "plot", "resume", "compare", "mpirun"} <= set(done)
+    results = {path.name for path in Path("results").iterdir()}
+    assert {"wide_port", "slow", "wide_port-001"} <= results
+    summary = json.loads(Path("results/wide_port/summary.json").read_text())
+    assert summary["simulated_seconds"] == 25.0
 
 
 def test_readers_of_the_documentation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

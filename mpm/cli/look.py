@@ -1,4 +1,4 @@
-"""Verbs that look at what a run has left: report, plot."""
+"""Verbs that look at what a run has left: report, plot, compare."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from mpm.cli.base import app
+from mpm.cli.complete import complete_run
 from mpm.launcher import rank
 from mpm.screen import say, screen
 
@@ -102,3 +103,27 @@ def plot(
     if not drawn:
         nothing = "holds nothing that is drawn: no fields of species or coverage, no history"
         print(f"{directories[0]}: {nothing}", file=sys.stderr)
+
+
+@app.command()
+def compare(
+    first: Annotated[
+        Path, typer.Argument(metavar="A", help="the directory of a run", autocompletion=complete_run)
+    ],
+    second: Annotated[
+        Path, typer.Argument(metavar="B", help="the directory of another run", autocompletion=complete_run)
+    ],
+    everything: Annotated[
+        bool, typer.Option("--all", help="all numbers, also those that are the same, and profiles row by row")
+    ] = False,
+) -> None:
+    """Put two runs side by side: the keys in which their cases differ, and the numbers.
+
+    mpm compare results/wide results/slow
+    """
+    if rank() != 0:
+        return
+    from mpm.compare import print_comparison
+    from mpm.results import load_run
+
+    print_comparison(load_run(first), load_run(second), everything, screen())

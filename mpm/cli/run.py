@@ -43,7 +43,6 @@ def run(
 ) -> None:
     """Run a case and write its results into a directory.
 
-    \b
     mpm run single_zone                            a built-in case, into results/single_zone
     mpm run wide.toml --name auto                  your own, into results/wide-001
     mpm run wide.toml -o slow --set motion.bed_velocity='8 mm/s'
@@ -83,7 +82,6 @@ def resume(
 ) -> None:
     """Go on with a run that was stopped, killed or has failed, or that is to run longer.
 
-    \b
     mpm resume results/wide                        to the end of its case
     mpm resume results/wide --end '40 s'           further
 
@@ -98,6 +96,27 @@ def resume(
         raise InputError.at("resume", "--end", repr(end), "nothing: a steady state has no end", given="")
     summary = _compute(case, directory, True, False, quiet)
     _show(case, summary, directory, not no_report, quiet)
+
+
+@app.command()
+def watch(
+    directory: RunArgument,
+    once: Annotated[bool, typer.Option("--once", help="say how far it is, and leave")] = False,
+) -> None:
+    """Follow a run that is at work in another terminal or on another machine, to its end.
+
+    mpm watch results/wide
+    mpm watch results/wide --once                  for a script: one look
+
+    Ctrl-C ends the watching, not the run. Exit status: that of the run (0 done, 3 failed, 130 stopped), 0 while it goes on.
+    """
+    from mpm.rundirs import require_run
+
+    require_run(directory, "nothing to watch")
+    if rank() == 0:
+        from mpm.watch import watch_run
+
+        raise typer.Exit(watch_run(directory, once, screen()))
 
 
 def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: bool) -> dict[str, Any]:

@@ -1,0 +1,134 @@
+"""Following a run from outside: what its log, its table and its lock tell, while another process computes it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mpm.case import load_case
+from mpm.errors import ConvergenceError, InputError, Interrupted
+from mpm.files import locked, read_text
+from mpm.history import read_table
+from mpm.nextsteps import print_end, print_steps
+from mpm.output import RunDirectory
+from mpm.progress import duration
+from mpm.quantities import quantity
+from mpm.screen import lines_of, say
+from mpm.tables import print_summary, shown
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+SHOWN = ("titration.*.exit_mean", "titration.*.box_mean", "cvd.rate_mean")
+"""Numbers of the history that one follows a run by."""
+LIVE, PIPED = 0.5, 5.0
+"""Seconds between two looks, on a terminal and elsewhere."""
+_STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ (.*)")
+
+
+@dataclass(frozen=True)
+class Look:
+    """A run at one moment: the last `line` of its log, which is `age` [s] old, and the `numbers` of its latest output."""
+
+    line: str
+    age: float
+    numbers: Mapping[str, float]
+
+    def text(self) -> list[str]:
+        """What a person reads: how far it is, then a number each."""
+        ago = f" ({duration(self.age)} ago)" if self.age >= 2.0 else ""
+        names = [name for pattern in SHOWN for name in self.numbers if fnmatch(name, pattern)]
+        numbers = dict(self.numbers)
+        return [
+            self.line + ago,
+            *(f"{quantity(name).label}: {shown(name, numbers, False)}" for name in names),
+        ]
+
+
+def look(path: Path) -> Look:
+    """What the files of a run in `path` say now. Whatever is just being written counts as not there."""
+    log = RunDirectory(path).log
+    try:
+        lines = [match[1] for line in read_text(log).splitlines() if (match := _STAMP.fullmatch(line))]
+        age = time.time() - log.stat().st_mtime
+    except (OSError, ValueError):
+        lines, age = [], 0.0
+    try:
+        rows = read_table(path / "history.csv")
+    except (OSError, InputError):
+        rows = []
+    told = [line for line in lines if not line.startswith("warning")]
+    return Look(told[-1] if told else "starting", max(age, 0.0), rows[-1] if rows else {})
+
+
+def watch_run(path: Path, once: bool, console: Console) -> int:
+    """Follow the run in `path` to its end and say how it ended; returns its exit status. `once`: say how it is now, and no more."""
+    if locked(RunDirectory(path).log):
+        if once:
+            for line in look(path).text():
+                say(console, line)
+            return 0
+        try:
+            _follow(path, console)
+        except KeyboardInterrupt:
+            say(console, f"no longer watching; the run in {path} goes on")
+            return 0
+    else:
+        say(console, f"no run is at work in {path}")
+    return _tell_end(path, console)
+
+
+def _follow(path: Path, console: Console) -> None:
+    """Until the run has ended: lines that renew themselves on a terminal, a line when there is something new elsewhere."""
+    from rich.live import Live
+    from rich.text import Text
+
+    log = RunDirectory(path).log
+    if not console.is_terminal:
+        last = ""
+        while locked(log):
+            now = look(path)
+            if now.line != last:
+                console.print("; ".join(now.text()), soft_wrap=True)
+                last = now.line
+            _wait(log, PIPED)
+        return
+    with Live(console=console, transient=True, auto_refresh=False) as live:
+        while locked(log):
+            lines = [part for line in look(path).text() for part in lines_of(line, console.width - 1)]
+            live.update(Text("\n".join(lines)), refresh=True)
+            _wait(log, LIVE)
+
+
+def _wait(log: Path, seconds: float) -> None:
+    """`seconds`, or less when the run ends."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and locked(log):
+        time.sleep(min(0.2, seconds))
+
+
+def _tell_end(path: Path, console: Console) -> int:
+    """How the last run ended, its numbers, and what to type next; returns its exit status."""
+    case, summary = load_case(path / "case.toml"), RunDirectory(path).read_summary()
+    name = shlex.quote(str(path))
+    go_on = [(f"mpm resume {name}", "go on"), (f"mpm plot {name}", "pictures of what there is")]
+    if summary is None:
+        say(console, f"{path}: the run was ended from outside; the last word of its log: {look(path).line}")
+        print_steps(go_on, console)
+        return Interrupted.exit_status
+    if summary.get("status") == "done":
+        say(console, f"{path}: the run is done")
+        print_end(case, summary, path, console, (path / "report.html").exists())
+        return 0
+    print_summary(summary, console)
+    console.print()
+    failed = summary.get("status") == "failed"
+    say(console, f"{path}: the run {'has failed' if failed else 'was interrupted'}: {look(path).line}")
+    print_steps(go_on, console)
+    return ConvergenceError.exit_status if failed else Interrupted.exit_status

@@ -1,0 +1,98 @@
+"""Following a run from outside: `mpm watch`."""
+
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mpm import watch
+from mpm.cli import main
+from mpm.files import locked
+from mpm.output import RunDirectory
+from mpm.reactor import Reactor
+from mpm.watch import look
+
+from mpi4py import MPI  # isort: skip  (after mpm.reactor, which loads the finite-element stack)
+
+from .cases import SHORT, TINY, zone
+
+
+def test_a_run_is_seen_while_it_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when the log of a run is not understood, its numbers are not those of the latest output, or watching disturbs it."""
+    seen: list[list[str]] = []
+    path = tmp_path / "run"
+
+    def callback(reactor: Reactor) -> None:
+        assert locked(path / "run.log")
+        seen.append(look(path).text())
+        assert main(["watch", str(path), "--once"]) == 0
+
+    result = Reactor(zone(SHORT, TINY), MPI.COMM_SELF).run(path, callback=callback)
+    assert result.summary["status"] == "done" and not locked(path / "run.log")
+    assert seen[0][0].startswith("flow found after ")
+    assert seen[2][0].startswith("0.26 of 1 s, step 19, ") and " steps/s" in seen[2][0]
+    labels = [line.partition(":")[0] for line in seen[-1][1:]]
+    assert labels == [
+        "coverage where solids leave the zone of tma, mean",
+        "coverage in the bed before tma, mean",
+        "parasitic CVD, mean rate",
+    ]
+    assert seen[-1][3].endswith("mol/m^3/s")
+    assert capsys.readouterr().out.splitlines()[0].startswith("flow found after ")
+    assert main(["watch", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"no run is at work in {path}\n{path}: the run is done\n") and "Next:" in said
+
+
+@pytest.mark.parametrize(
+    ("summary", "status", "says"),
+    [
+        ({"status": "failed", "simulated_seconds": 0.5}, 3, "the run has failed: Newton stopped"),
+        ({"status": "interrupted", "simulated_seconds": 0.5}, 130, "the run was interrupted"),
+        (None, 130, "ended from outside; the last word of its log: Newton stopped"),
+    ],
+)
+def test_watching_ends_with_the_run(
+    summary: dict[str, Any] | None,
+    status: int,
+    says: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Fails when a line of a run at work is not passed on in a pipe, the end is not noticed, or it is told wrongly."""
+    monkeypatch.setattr(watch, "PIPED", 0.05)
+    run = RunDirectory(tmp_path / "run")
+    run.prepare()
+    run.write_case(zone(mesh=TINY).to_toml())
+    told: list[str] = []
+
+    def compute() -> None:
+        for words in ("first words", "second words", "Newton stopped"):
+            with run.log.open("a") as log:
+                log.write(f"2026-01-02 03:04:05,678 {words}\n")
+            deadline = time.monotonic() + 30.0
+            while words not in "".join(told) and time.monotonic() < deadline:
+                told.append(capsys.readouterr().out)
+                time.sleep(0.02)
+        if summary is not None:
+            run.write_summary(summary)
+        run.release()
+
+    other = threading.Thread(target=compute)
+    other.start()
+    ended = main(["watch", str(run.path)])
+    other.join()
+    text = "".join(told) + capsys.readouterr().out
+    assert ended == status
+    order = [text.index(words) for words in ("first words", "second words", "Newton stopped", says)]
+    assert order == sorted(order)
+    assert f"mpm resume {run.path}" in text
+
+
+def test_what_is_no_run_is_not_watched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when a directory without a run is watched for ever."""
+    assert main(["watch", str(tmp_path)]) == 2
+    assert "nothing to watch" in capsys.readouterr().err
