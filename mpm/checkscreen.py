@@ -70,7 +70,8 @@ def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
     sheet.print(console)
     _sentences(console, "To know", report["notes"])
     _sentences(console, "Without effect in this case", report["without_effect"])
-    _sentences(console, "Marks", [MARKS])
+    if any(value.origin != "typed" for value in marked.values.values()):
+        _sentences(console, "Marks", [MARKS])
     if report["warnings"]:
         console.print()
     print_warnings(console, report["warnings"])

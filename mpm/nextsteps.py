@@ -14,6 +14,7 @@ from mpm.checks import check_case
 from mpm.errors import ConvergenceError, Interrupted
 from mpm.screen import say, together
 from mpm.tables import print_summary
+from mpm.verdict import verdict
 
 if TYPE_CHECKING:
     from mpm.case import Case
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 def print_end(case: Case, summary: dict[str, Any], directory: Path, console: Console, reported: bool) -> None:
     """What a finished run says: its numbers, what `mpm check` warns of, and what to type next; `reported`: its page is being written."""
+    console.print()
+    say(console, verdict(case, summary), hang=0, style="bold")
     print_summary(summary, console, check_case(case)["warnings"])
     print_next_steps(directory, summary, console, reported)
 

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from mpm.reactor import Reactor
 
 
+FLOW = "finding the flow of the gas"
+"""Said at once wherever it goes: it may take minutes."""
+
+
 class LogFile(logging.FileHandler):
     """A log that says nothing when the disk is full: the next table does."""
 
@@ -85,7 +89,7 @@ class Progress:
             return
         if self.status is not None:
             self.status.update(Text(text))
-        elif clock.monotonic() - self.printed > self.interval or text == "flow":
+        elif clock.monotonic() - self.printed > self.interval or text == FLOW:
             self.printed = clock.monotonic()
             self.console.print(text)
 

@@ -30,7 +30,7 @@ from mpm.motion import BedMotion, step_motion
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, largest, on_root, total
 from mpm.phases import LastCycle, phase_fields
-from mpm.progress import Progress, log_file
+from mpm.progress import FLOW, Progress, log_file
 from mpm.replay import March, Replay
 from mpm.schedule import Schedule, Step
 from mpm.signals import stop_signals
@@ -219,7 +219,7 @@ class Reactor:
     def _start(self, bar: Progress) -> None:
         """Find the flow of a fresh run, unless it was handed over."""
         if self.flows is None:
-            bar.say("flow")
+            bar.say(FLOW)
             self.flows = self._find_flow(bar)
         self.flows.register(self.transport)
 
@@ -228,7 +228,7 @@ class Reactor:
             return March(self.case, self.strip, self.motion, self.schedule)
 
         def watch(cycle: int, change: float) -> None:
-            bar.say(f"flow, cycle {cycle + 1}, change {change:.1e}")
+            bar.say(f"{FLOW}: cycle {cycle + 1}, relative change {change:.0e}")
             self._check_stop()
 
         flows = Replay.solve(self.case, self.strip, self.motion, self.schedule, watch)
@@ -242,7 +242,7 @@ class Reactor:
         """Find the quasi-steady state; the last iterate is written when that fails or is out of balance."""
 
         def watch(iteration: int, residual: float) -> None:
-            bar.say(f"steady state, Newton step {iteration}, residual {residual:.1e} of the feed")
+            bar.say(f"steady state, Newton step {iteration}, residual {residual:.0e} of the feed")
             self._check_stop()
 
         error: ConvergenceError | Interrupted | None = None

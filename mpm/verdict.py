@@ -9,14 +9,14 @@ if TYPE_CHECKING:
     from mpm.case import Case, Inlet
 
 NOTHING = 1e-12
-"""Share of what was fed below which gas reactions have made nothing: rounding of a solver that converges to 1e-10 of the feed."""
+"""A share below which there is nothing: rounding of a solver that converges to 1e-10 of the feed."""
 REMAINDER = 1e-3
 """Shares closer to 0 or 1 than this are printed with more digits: 99.98 % is not 100 %."""
 
 
 def percent(share: float) -> str:
-    """A share as a percentage of three digits, never rounded to 0 or 100 when it is not."""
-    if share in (0.0, 1.0):
+    """A share as a percentage of three digits, not rounded to 0 or 100 when it is more than NOTHING away from them."""
+    if share < NOTHING or share == 1.0:
         return f"{100.0 * share:.0f} %"
     if 1.0 - REMAINDER < share < 1.0:
         lacking = f"{100.0 * (1.0 - share):.1g}"

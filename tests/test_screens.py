@@ -102,14 +102,16 @@ SCREENS: dict[str, list[str]] = {
     "check --full": ["check", "single_zone", "--full"],
     "mesh": ["mesh", "single_zone", "--set", "geometry.cell_width=5 mm"],
     "run": ["run", "single_cycle", "-o", "again", "--overwrite", "--set", "geometry.cell_width=9 mm"],
-    "run, steady": ["run", "single_zone", "-o", "still", "--overwrite", "--set", "fidelity=steady"],
+    "run, steady": ["run", "single_zone", "-o", "still", "--no-report", "--overwrite", "--set", "fidelity=steady"],
     "resume": ["resume", "longer", "--end", "1.1 s"],
     "plot": ["plot", "run"],
+    "report": ["report", "run"],
+    "report of two": ["report", "run", "run2"],
     "sweep": ["sweep", "sweep.toml", "-o", "sweep"],
     "--version": ["--version"],
 }  # fmt: skip
 """Calls whose screens are for people; those that compute do so on the tiny mesh."""
-LINES = {"plot", "sweep"}
+LINES = {"plot", "report", "report of two", "sweep"}
 """Those that print paths and progress alone, which have no layout."""
 for _name in ("run", "run, steady"):
     for _key, _value in {**SHORT, **TINY}.items():
@@ -254,6 +256,22 @@ def on_a_terminal(arguments: list[str], columns: int) -> str:
     os.close(keyboard)
     assert process.wait() == 0
     return b"".join(parts).decode()
+
+
+def test_a_long_message_breaks_between_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when the one line that says what is wrong with an input is broken within a word on a terminal, or broken at all in a pipe."""
+    said = {}
+    for columns in (None, 60):
+        stream = Terminal(columns is not None)
+        with monkeypatch.context() as patch:
+            patch.setenv("COLUMNS", str(columns or 80))
+            patch.setenv("TERM", "xterm")
+            patch.setattr(sys, "stderr", stream)
+            assert main(["check", "single_zone", "--set", "gas.carrier=Xenon and more"]) == 2
+        said[columns] = stream.text().splitlines()
+    assert len(said[None]) == 1 and len(said[None][0]) > 60
+    assert len(said[60]) > 1 and max(map(len, said[60])) <= 60
+    assert " ".join(line.strip() for line in said[60]) == said[None][0]
 
 
 def test_a_real_terminal(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

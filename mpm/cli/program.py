@@ -23,7 +23,7 @@ from mpm.cli.base import app
 from mpm.cli.help import missing
 from mpm.errors import InputError, Interrupted, MpmError, printable, storage_error
 from mpm.launcher import rank
-from mpm.screen import spell_out
+from mpm.screen import say, screen, spell_out
 
 _PATIENCE = 30.0
 """Seconds that a failing rank waits for the others to fail as well before it ends the whole job."""
@@ -85,7 +85,7 @@ def _terminable() -> Iterator[None]:
 def _end(status: int, line: str) -> int:
     """Say `line` once, wait for the other ranks to fail too, and return the status."""
     if rank() == 0:
-        print(printable(line), file=sys.stderr, flush=True)
+        say(screen(stderr=True), printable(line))
     mpi = sys.modules.get("mpi4py.MPI")
     if mpi is None or not mpi.Is_initialized() or mpi.Is_finalized() or mpi.COMM_WORLD.size == 1:
         return status
