@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mpm.balances import LIMIT
 from mpm.diagnostics import exit_column
+from mpm.fieldnames import NOTHING
 from mpm.labels import literal
 from mpm.maps import name_of, values_of
 from mpm.outline import MM, OKABE_ITO, formula
@@ -23,11 +24,11 @@ from mpm.vtu import Snapshot
 
 Floats = NDArray[np.float64]
 TITRATION = {
-    "box_mean": ("-", "in the bed before the inlet, mean"),
-    "exit_mean": ("--", "where solids leave the zone, mean"),
-    "exit_min": (":", "where solids leave the zone, worst row"),
+    "box_mean": ("-", "in the bed before the inlet, mean", "in the zone before the inlet, mean"),
+    "exit_mean": ("--", "where solids leave the zone, mean", "in the last column of the zone, mean"),
+    "exit_min": (":", "where solids leave the zone, worst row", "in the last column of the zone, worst row"),
 }
-"""Line and words of the columns of a titration."""
+"""Line and words of the columns of a titration, where a bed is conveyed and where nothing moves."""
 BELOW = 1e-6
 """Part of the largest mole fraction in any outlet below which curves are named and not drawn."""
 
@@ -49,7 +50,8 @@ def history_figure(run: Run) -> Figure:
         axes = figure.add_subplot(grid[k // columns, k % columns], sharex=first, sharey=first)
         first = first or axes
         for kind, values in curves.items():
-            dash, words = TITRATION[kind]
+            dash, conveyed, at_rest = TITRATION[kind]
+            words = conveyed if run.case.conveying_velocity else at_rest
             axes.plot(time, values, dash, color=OKABE_ITO[list(TITRATION).index(kind)], label=words)
         axes.set(ylim=(-0.03, 1.03), ylabel="coverage", xlabel="time [s]")
         axes.set_title(title, fontsize=9)
@@ -141,11 +143,12 @@ def outlets_figure(run: Run) -> Figure:
 
 
 def largest_fraction(run: Run) -> float:
-    """Largest mole fraction of a species in any outlet at any time; 0 when nothing but carrier leaves."""
+    """Largest mole fraction of a species in any outlet at any time; 0 when nothing but carrier (and rounding) leaves."""
     everything = [
         values for outlet in run.case.geometry.outlets for values in outlet_species(run, outlet.name).values()
     ]
-    return float(np.nanmax(everything, initial=0.0)) if everything else 0.0
+    largest = float(np.nanmax(everything, initial=0.0)) if everything else 0.0
+    return largest if largest > NOTHING else 0.0
 
 
 def outlet_species(run: Run, outlet: str) -> dict[str, Floats]:

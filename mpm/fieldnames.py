@@ -23,6 +23,8 @@ DECADES = 4
 """Range of a logarithmic scale below its maximum."""
 ROUNDING = 1e-6
 """Relative difference of two values that counts as none: files hold single precision."""
+NOTHING = 1e-15
+"""Mole fraction up to which a species counts as absent: rounding of 0."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class FieldName:
 
     `unit` is SI (RATIO: a pure number, "": a number of something), `shown` what people read. `colours` is a colour map of matplotlib;
     `limits` are fixed ends of the scale [unit]; a `signed` field has 0 in the middle of its scale; a `porous` one exists on surfaces alone.
+    What is nowhere above `nothing` [unit] is rounding of 0.
     """
 
     name: str
@@ -43,6 +46,7 @@ class FieldName:
     limits: tuple[float, float] | None = None
     signed: bool = False
     porous: bool = False
+    nothing: float = 0.0
 
     @property
     def label(self) -> str:
@@ -62,9 +66,9 @@ class FieldName:
 
 FIELDS = (
     FieldName("theta_<site>", "coverage of {}", colours="cividis", limits=(0.0, 1.0), porous=True),
-    FieldName("x_<species>", "mole fraction of {}", scale="log"),
-    FieldName("C_<species>", "concentration of {}", "mol/m^3", scale="log"),
-    FieldName("cvd_rate", "rate of parasitic CVD", "mol/m^3/s", scale="log"),
+    FieldName("x_<species>", "mole fraction of {}", scale="log", nothing=NOTHING),
+    FieldName("C_<species>", "concentration of {}", "mol/m^3", scale="log", nothing=1e-14),
+    FieldName("cvd_rate", "rate of parasitic CVD", "mol/m^3/s", scale="log", nothing=1e-14),
     FieldName("velocity", "speed of the gas (superficial, relative to the reactor)", "m/s", "cm/s"),
     FieldName("velocity_lab", "speed of the gas in the laboratory (superficial)", "m/s", "cm/s"),
     FieldName("bed_velocity", "speed of the bed relative to the reactor", "m/s", "cm/s"),
@@ -122,6 +126,8 @@ def colour_limits(field: FieldName, low: float, high: float) -> Limits:
     A logarithmic one ends `DECADES` below the largest value. It becomes linear where the values lie within half a decade, like those of a
     carrier, whose small differences it would hide.
     """
+    if max(abs(low), abs(high)) <= field.nothing:
+        return Limits(0.0, 0.0, constant=True)
     span = field.limits[1] - field.limits[0] if field.limits else max(abs(low), abs(high))
     if high - low <= ROUNDING * span:
         return Limits(low, high, constant=True)

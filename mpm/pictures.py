@@ -40,7 +40,7 @@ from mpm.curves import (
 from mpm.errors import InputError
 from mpm.fieldnames import Limits, field_name
 from mpm.files import file_name, write_picture
-from mpm.maps import map_figure, when
+from mpm.maps import ends_of, map_figure, when
 from mpm.outline import OKABE_ITO
 from mpm.results import Run, fed_species, load_run, made_sites
 from mpm.vtu import Snapshot
@@ -176,7 +176,10 @@ def maps(run: Run, snapshot: Snapshot, suffix: str) -> Iterator[Picture]:
     for site in made_sites(run.case):
         wanted[f"theta_{site}"] = "coverage" if not wanted else f"coverage_{site}"
     wanted |= {f"x_{species}": f"map_{species}" for species in fed_species(run.case)}
-    if np.any(snapshot.cell_data.get("cvd_rate", 0.0)):
+    if (
+        "cvd_rate" in snapshot.cell_data
+        and ends_of(run, [snapshot], "cvd_rate")[1] > field_name("cvd_rate").nothing
+    ):
         wanted["cvd_rate"] = "map_cvd"
     wanted |= {
         name: stem

@@ -42,12 +42,13 @@ def test_words_name_the_subject() -> None:
 
 
 def test_scales_fit_the_values() -> None:
-    """Fails when a constant gets a scale, a carrier a logarithmic one, or four decades are not kept."""
+    """Fails when a constant gets a scale, a carrier a logarithmic one, four decades are not kept, or rounding of 0 is coloured."""
     x = field_name("x_TMA")
     assert colour_limits(x, 0.0, 1e-3) == Limits(pytest.approx(1e-7), 1e-3, log=True)
     assert colour_limits(x, 1e-5, 1e-3) == Limits(1e-5, 1e-3, log=True)
     assert colour_limits(x, 0.9997, 1.0) == Limits(0.9997, 1.0)
     assert colour_limits(x, 0.0, 0.0).constant and colour_limits(x, 0.5, 0.5 * (1 + 1e-7)).constant
+    assert colour_limits(x, 1e-40, 1e-22) == Limits(0.0, 0.0, constant=True)
     theta = field_name("theta_OH")
     assert colour_limits(theta, 0.2, 0.4) == Limits(0.0, 1.0)
     assert colour_limits(theta, 0.0, 1e-20).constant and colour_limits(theta, 1.0, 1.0).constant
