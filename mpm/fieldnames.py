@@ -124,7 +124,7 @@ def colour_limits(field: FieldName, low: float, high: float) -> Limits:
     """The scale for values between `low` and `high` (the least and the largest of all that share it).
 
     A logarithmic one ends `DECADES` below the largest value. It becomes linear where the values lie within half a decade, like those of a
-    carrier, whose small differences it would hide.
+    carrier, whose small differences it would hide. A linear one that nearly begins at 0 begins there.
     """
     if max(abs(low), abs(high)) <= field.nothing:
         return Limits(0.0, 0.0, constant=True)
@@ -138,7 +138,7 @@ def colour_limits(field: FieldName, low: float, high: float) -> Limits:
         return Limits(-end, end)
     if field.scale == "log" and high > 0.0 and low < high / np.sqrt(10.0):
         return Limits(max(low, high * 10.0**-DECADES), high, log=True)
-    return Limits(low, high)
+    return Limits(0.0 if 0.0 < low < 0.1 * high else low, high)
 
 
 def superscript(unit: str) -> str:

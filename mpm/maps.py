@@ -204,7 +204,9 @@ def scale_bar(
         value = f"{0.5 * (limits.low + limits.high) / entry.factor:.4g}"
         figure.supxlabel(f"{words}, constant: {in_unit(entry, value)}", fontsize=9)
         return
-    below, above = values.min() * entry.factor < limits.low, values.max() * entry.factor > limits.high
+    low, high = (end / entry.factor for end in (limits.low, limits.high))
+    rounding = 1e-9 * (high - low)
+    below, above = values.min() < low - rounding, values.max() > high + rounding
     extend = ("both" if above else "min") if below else "max" if above else "neither"
     bar = figure.colorbar(
         mesh,

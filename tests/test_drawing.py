@@ -171,6 +171,23 @@ def test_the_screen_names_every_picture(zone: Run) -> None:
     assert {Path(line.partition(": ")[0]) for line in lines} == set(folder.glob("*.png")) and len(lines) == 8
 
 
+def test_what_the_documentation_tells_to_type(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when a command or the program of docs/pictures.md does not work as printed."""
+    text = (Path(__file__).parents[1] / "docs" / "pictures.md").read_text(encoding="utf-8")
+    commands = re.findall(r"^    mpm (plot .*?) +#", text, re.MULTILINE)
+    (tmp_path / "results").mkdir()
+    for name in ("single_zone", "slow"):
+        write_run(tmp_path / "results" / name, load_case("single_zone", COARSE), TIMES[:3])
+    monkeypatch.chdir(tmp_path)
+    typed = [command.split() for command in commands if "--field" in command]
+    assert len(commands) == 6 and len(typed) == 3
+    for arguments in typed:
+        assert CliRunner().invoke(app, arguments).exit_code == 0
+    (program,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    exec(program, {})
+    assert (tmp_path / "speed.png").stat().st_size > 3000
+
+
 def test_times_and_ranges() -> None:
     """Fails when a unit of time is not converted, or a negative end is refused."""
     assert (parse_time("1.5"), parse_time("250 ms")) == (1.5, 0.25)

@@ -52,6 +52,7 @@ def test_scales_fit_the_values() -> None:
     theta = field_name("theta_OH")
     assert colour_limits(theta, 0.2, 0.4) == Limits(0.0, 1.0)
     assert colour_limits(theta, 0.0, 1e-20).constant and colour_limits(theta, 1.0, 1.0).constant
+    assert colour_limits(field_name("pressure"), 0.01, 45.0) == Limits(0.0, 45.0)
     assert colour_limits(field_name("velocity_x"), -1.0, 3.0) == Limits(-3.0, 3.0)
 
 

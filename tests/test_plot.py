@@ -200,6 +200,13 @@ def test_a_steady_picture_speaks_of_no_time(tmp_path: Path) -> None:
         assert not [line for line in words if re.search(r"\bt = |\d s\b", line)]
 
 
+def extended(figure: Figure) -> str:
+    """Which ends of the colour bar are pointed: values lie beyond them."""
+    (mesh,) = meshes(figure.axes[0])
+    assert mesh.colorbar is not None
+    return mesh.colorbar.extend
+
+
 def test_any_field_at_any_time_in_any_range(cycle: Run) -> None:
     """Fails when another time than the nearest is drawn, or the chosen range is not that of the colours in the unit of their label."""
     figure = draw_field(cycle, "theta_OH", time=0.6)
@@ -211,6 +218,7 @@ def test_any_field_at_any_time_in_any_range(cycle: Run) -> None:
     figure = draw_field(cycle, "velocity", clim=(0.0, 5.0))
     (mesh,) = meshes(figure.axes[0])
     assert mesh.get_clim() == (0.0, 5.0) and np.allclose(drawn(mesh), 3.0)
+    assert extended(figure) == "neither" and extended(draw_field(cycle, "velocity", clim=(0.0, 2.0))) == "max"
     figure = draw_field(cycle, "x_TMA", clim=(1e-6, 1e-4))
     (mesh,) = meshes(figure.axes[0])
     assert isinstance(mesh.norm, LogNorm) and mesh.get_clim() == (1e-6, 1e-4)
