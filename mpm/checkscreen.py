@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +31,12 @@ MARKS = (
 class Marked:
     """The values of a case as people read them, marked where nobody typed them."""
 
-    def __init__(self, case: Case):
-        self.values: dict[str, Value] = {value.name: value for value in values(case)}
+    def __init__(self, case: Case, origins: Mapping[str, str] | None = None):
+        """`origins`: those noted when a run was started, of which its resolved case no longer tells."""
+        found = {value.name: value for value in values(case)}
+        self.values = {
+            name: replace(v, origin=(origins or {}).get(name, v.origin)) for name, v in found.items()
+        }
 
     def text(self, name: str) -> str | None:
         """`3.5 cm/s (default)` of a dotted key; None where the case has no such value."""
@@ -59,6 +65,18 @@ def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
     console.print()
     for line in sketch(case, min(console.width, PAGE), pen_for(console.encoding)):
         console.print(line, soft_wrap=True)
+    case_sheet(case, report, marked).print(console)
+    _sentences(console, "To know", report["notes"])
+    _sentences(console, "Without effect in this case", report["without_effect"])
+    if any(value.origin != "typed" for value in marked.values.values()):
+        _sentences(console, "Marks", [MARKS])
+    if report["warnings"]:
+        console.print()
+    print_warnings(console, report["warnings"])
+
+
+def case_sheet(case: Case, report: dict[str, Any], marked: Marked) -> Sheet:
+    """The case and its numbers in groups."""
     sheet = Sheet(room=40)
     _strip(sheet, case, report, marked)
     _powders(sheet, case, report, marked)
@@ -67,14 +85,7 @@ def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
     _motion(sheet, case, report, marked)
     _engineering(sheet, report)
     _cost(sheet, case, report, marked)
-    sheet.print(console)
-    _sentences(console, "To know", report["notes"])
-    _sentences(console, "Without effect in this case", report["without_effect"])
-    if any(value.origin != "typed" for value in marked.values.values()):
-        _sentences(console, "Marks", [MARKS])
-    if report["warnings"]:
-        console.print()
-    print_warnings(console, report["warnings"])
+    return sheet
 
 
 def print_full(case: Case, console: Console) -> None:

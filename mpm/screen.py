@@ -23,7 +23,7 @@ WIDE = 100
 """Columns from which a terminal is shown tables."""
 NARROW = 72
 """Columns below which a value follows its label instead of standing in a column."""
-_HARD_SPACE = "\u00a0"
+HARD_SPACE = "\u00a0"
 
 
 def spell_out() -> None:
@@ -78,10 +78,10 @@ class Listing:
             return
         for name, *values in self.rows:
             pairs = zip(self.headings[1:], values, strict=False)
-            say(console, f"{name}: " + ", ".join(_entry(key, v) for key, v in pairs if v), indent)
+            say(console, f"{name}: " + ", ".join(entry(key, v) for key, v in pairs if v), indent)
 
 
-def _entry(heading: str, value: str) -> str:
+def entry(heading: str, value: str) -> str:
     """`height [mm]`, `3` as `height 3 mm`, which stays on one line."""
     name, _, unit = heading.partition(" [")
     return together(f"{name} {value} {unit.removesuffix(']')}".strip())
@@ -89,7 +89,7 @@ def _entry(heading: str, value: str) -> str:
 
 def together(text: str) -> str:
     """`text` as one word for `say`: a number stays with its unit."""
-    return text.replace(" ", _HARD_SPACE)
+    return text.replace(" ", HARD_SPACE)
 
 
 def figure(value: float, unit: str = "", digits: int = 4) -> str:
@@ -105,7 +105,7 @@ def number(value: float, unit: str = "", digits: int = 4) -> str:
 
 def _clean(text: str) -> str:
     """`text` as `printable` has it, with its hard spaces."""
-    return _HARD_SPACE.join(printable(part) for part in text.split(_HARD_SPACE))
+    return HARD_SPACE.join(printable(part) for part in text.split(HARD_SPACE))
 
 
 def say(console: Console, text: str, indent: int = 0, hang: int = 4, style: str = "") -> None:
@@ -126,7 +126,7 @@ def lines_of(text: str, width: int, indent: int = 0, hang: int = 4) -> list[str]
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return [line.replace(_HARD_SPACE, " ") for line in lines]
+    return [line.replace(HARD_SPACE, " ") for line in lines]
 
 
 class Sheet:
@@ -146,7 +146,7 @@ class Sheet:
     def add(self, label: str, value: str | None, part: bool = False) -> None:
         """A row of the last group, below the one before it if it is a `part` of that; None: the number does not exist here."""
         if value is not None:
-            self.groups[-1][1].append((2 * _HARD_SPACE * part + _clean(label), _clean(value)))
+            self.groups[-1][1].append((2 * HARD_SPACE * part + _clean(label), _clean(value)))
 
     def list(self, listing: Listing) -> None:
         """Rows of the last group that are a table where there is room for one."""
@@ -173,4 +173,4 @@ class Sheet:
                 elif len(label) > column - 2 or console.width < NARROW or crowded:
                     say(console, f"{label}: {value}", 2)
                 else:
-                    say(console, f"{label:{column}}".replace(" ", _HARD_SPACE) + value, 2, column)
+                    say(console, f"{label:{column}}".replace(" ", HARD_SPACE) + value, 2, column)

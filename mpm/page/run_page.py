@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mpm.checks import check_case
+from mpm.checkscreen import MARKS, Marked, case_sheet
 from mpm.fieldnames import field_name
 from mpm.keys import values
 from mpm.page.curves import Chart, curves
@@ -30,6 +31,7 @@ from mpm.page.numbers import Account, Row, accounts, errors, groups
 from mpm.page.strip import Drawing, drawing
 from mpm.page.write import render
 from mpm.results import Run, load_run, made_sites
+from mpm.screen import HARD_SPACE, Listing, entry
 from mpm.verdict import verdict
 from mpm.vtu import Snapshot
 
@@ -58,7 +60,9 @@ class RunPage:
     name: str
     verdict: str
     warnings: list[str]
+    notes: list[str]
     idle: list[str]
+    asked: list[tuple[str, list[tuple[str, str]]]]
     strip: Drawing
     groups: list[tuple[str, list[Row]]]
     accounts: list[Account]
@@ -99,7 +103,9 @@ def run_page(
         if run.summary
         else "This run has not reported its numbers yet.",
         warnings=list(report["warnings"]),
+        notes=list(report["notes"]),
         idle=list(report["without_effect"]),
+        asked=asked(run, report),
         strip=drawing(run.case),
         groups=groups(run.summary),
         accounts=accounts(run.summary),
@@ -129,6 +135,32 @@ def inputs(run: Run) -> list[tuple[str, list[Input]]]:
     told = {one.key for _, rows in groups for one in rows}
     rest = [one for one in found if one.key not in told]
     return [(title, rows) for title, rows in (*groups, ("Other", rest)) if rows]
+
+
+def asked(run: Run, report: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """The groups of `mpm check`: the case and what an engineer asks first, rows of label and value."""
+    groups = []
+    for heading, rows in case_sheet(run.case, report, Marked(run.case, run.origins)).groups:
+        lines: list[tuple[str, str]] = []
+        for row in rows:
+            if isinstance(row, Listing):
+                lines += [(name, _pairs(row.headings[1:], cells)) for name, *cells in row.rows]
+            else:
+                lines.append((_spaced(row[0]), _spaced(row[1])))
+        if lines:
+            groups.append((heading, lines))
+    return groups
+
+
+def _pairs(headings: Sequence[str], cells: Sequence[str]) -> str:
+    return _spaced(
+        ", ".join(entry(heading, cell) for heading, cell in zip(headings, cells, strict=False) if cell)
+    )
+
+
+def _spaced(text: str) -> str:
+    """As a browser breaks it: a screen keeps numbers and their units together with a space of its own."""
+    return text.replace(HARD_SPACE, "\u00a0")
 
 
 def reproduce(run: Run) -> dict[str, Any]:
@@ -269,4 +301,4 @@ def run_html(page: RunPage) -> str:
         "charts": {str(index): chart for index, chart in enumerate(page.charts)},
         "viewers": {"viewer": page.viewer} if page.viewer else {},
     }
-    return render("run.html", page.run.case.title or page.name, data, page=page)
+    return render("run.html", page.run.case.title or page.name, data, page=page, marks=MARKS)

@@ -94,7 +94,7 @@ def drawing(case: Case) -> Drawing:
         length=f"{geometry.length * MM:g} mm",
         above=max((p.line + 1 for p in ports if p.side == "top"), default=0),
         below=max((p.line + 1 for p in ports if p.side == "bottom"), default=0),
-        ticks=_ticks(geometry.length, per_metre),
+        ticks=_ticks(geometry.length, per_metre, ports),
     )
 
 
@@ -180,10 +180,12 @@ def _ports(case: Case, per_metre: float) -> list[PortMark]:
     return marks
 
 
-def _ticks(length: float, per_metre: float) -> list[tuple[float, str]]:
-    """Round positions along x [mm], five to ten of them."""
+def _ticks(length: float, per_metre: float, ports: Sequence[PortMark]) -> list[tuple[float, str]]:
+    """Round positions along x [mm], five to ten of them; no number where an arrow of a port below stands."""
     rough = length * MM / 7.0
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(power * factor for factor in (1.0, 2.0, 5.0, 10.0) if power * factor >= rough)
     count = int(length * MM / step + 1e-9)
-    return [(i * step / MM * per_metre, f"{i * step:g}") for i in range(count + 1)]
+    arrows = [port.x + 0.5 * port.width for port in ports if port.side == "bottom"]
+    places = [(i * step / MM * per_metre, f"{i * step:g}") for i in range(count + 1)]
+    return [(x, "" if any(abs(x - at) < 2.5 * LETTER for at in arrows) else text) for x, text in places]

@@ -19,6 +19,7 @@ from mpm.quantities import quantity
 from mpm.schema import number_text
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
+from mpm.tables import ROUNDING
 
 NAME = "report.html"
 MOST_PAGES = 200
@@ -146,6 +147,11 @@ def _column(name: str, cells: Sequence[str], steady: bool) -> Column:
     return Column(name, what.label, superscript(what.unit_shown), what.meaning, values)
 
 
+def visible(column: Column, value: float) -> str:
+    """A number of the table; of shares and coverages what is rounding beside 1 is 0."""
+    return "0" if not column.unit and abs(value) < ROUNDING else shown(value)
+
+
 def _is_number(cell: str) -> bool:
     try:
         return math.isfinite(float(cell))
@@ -201,6 +207,6 @@ def sweep_html(page: SweepPage) -> str:
         page.title,
         {"charts": {}, "sweep": data},
         page=page,
-        shown=shown,
+        shown=visible,
         number_text=number_text,
     )
