@@ -11,6 +11,7 @@
 | `flux.csv` | gas velocity through the upper face of every layer along x, mean of a cycle |
 | `checkpoint.npz` | restart state |
 | `report.html` | one page with everything, for a browser |
+| `view.py`, `vibration.py` | scripts that open the run in ParaView |
 | `run.log`, `plots/*` | log; pictures and movies |
 
 Plain Python and numpy; the arrays that come in are global and in the grid's order. Files are replaced as a whole
@@ -47,6 +48,8 @@ OWN_FILES = (
     "case.toml",
     "origin.json",
     "report.html",
+    "view.py",
+    "vibration.py",
     "fields.pvd",
     "phases.pvd",
     "history.csv",

@@ -28,7 +28,8 @@ class LastCycle:
     """`count` of the steps `begin` <= index < `end`, the last cycle of whole steps, at equal distances; no steps: nothing is written.
 
     Phases count from the start of the vibration, so that they are those of a sine whatever the end of the run: number k of `count` is
-    the end of the step at which w t = 2 pi k / count.
+    the end of the step at which w t = 2 pi k / count. The cycle ends with the run, not with a phase: one that is prolonged within a cycle
+    goes on from a state before which this cycle's phases were the last one's, and are there.
     """
 
     begin: int

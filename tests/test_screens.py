@@ -107,6 +107,7 @@ SCREENS: dict[str, list[str]] = {
     "plot": ["plot", "run"],
     "report": ["report", "run"],
     "report of two": ["report", "run", "run2"],
+    "paraview": ["paraview", "run"],
     "sweep": ["sweep", "sweep.toml", "-o", "sweep"],
     "--version": ["--version"],
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Verbs that look at what a run has left: report, plot, compare."""
+"""Verbs that look at what a run has left: report, plot, paraview, compare."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from mpm.cli.base import app
+from mpm.cli.base import RunArgument, app
 from mpm.cli.complete import complete_run
 from mpm.launcher import rank
 from mpm.screen import say, screen
@@ -127,3 +127,33 @@ def compare(
     from mpm.results import load_run
 
     print_comparison(load_run(first), load_run(second), everything, screen())
+
+
+@app.command()
+def paraview(
+    directory: RunArgument,
+    vibration: Annotated[
+        bool, typer.Option("--vibration", help="with --open: the last cycle, phase by phase (output.phases)")
+    ] = False,
+    start: Annotated[bool, typer.Option("--open", help="start ParaView, which must be on the PATH")] = False,
+) -> None:
+    """Write scripts that open a run in ParaView as a picture.
+
+    \b
+    mpm paraview results/single_zone            say what to type
+    mpm paraview results/single_zone --open     start ParaView at once
+
+    The right fields, colours that hold for all times, heights stretched, a label of the time. Where the run has phases
+    (output.phases) a second script plays the vibration.
+    """
+    if rank() != 0:
+        return
+    from mpm.paraview import open_script, write_scripts
+
+    scripts = write_scripts(directory, lambda line: print(line, file=sys.stderr))
+    if start:
+        raise typer.Exit(open_script(scripts, vibration))
+    console = screen()
+    for script in scripts:
+        say(console, f"{script.shows}:")
+        print(f"    {script.typed}")
