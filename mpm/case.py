@@ -40,7 +40,7 @@ from mpm.mechanism import Chemistry, build_mechanism, check_rates
 from mpm.messages import to_input_error
 from mpm.names import case_file
 from mpm.profile import PRESETS, BedProfile, read_profile
-from mpm.schema import finished
+from mpm.schema import DRAFT, finished
 from mpm.units import (
     DIFFUSIVITY,
     Angle,
@@ -451,7 +451,7 @@ class Case(Frozen):
     def with_(self, changes: Mapping[str, Any]) -> Case:
         """Return the case that the same file gives with these dotted keys changed; everything is checked anew."""
         data, overrides, folder, label = self._origin
-        case = _build(data, {**overrides, **changes}, folder, label)
+        case = build_case(data, {**overrides, **changes}, folder, label)
         case._source = self._source
         return case
 
@@ -485,9 +485,9 @@ def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, An
     Raises InputError, whose message is one line.
     """
     if isinstance(source, Mapping):
-        return _build(source, overrides or {}, Path.cwd(), "case")
+        return build_case(source, overrides or {}, Path.cwd(), "case")
     path = case_file(source) if isinstance(source, str) else source
-    case = _build(read_input(path, CASE), overrides or {}, path.resolve().parent, str(source))
+    case = build_case(read_input(path, CASE), overrides or {}, path.resolve().parent, str(source))
     case._source = path
     return case
 
@@ -495,10 +495,10 @@ def load_case(source: str | Path | Mapping[str, Any], overrides: Mapping[str, An
 def case_schema() -> dict[str, Any]:
     """JSON Schema of a case file, for editors."""
     schema = finished(Case.model_json_schema(by_alias=True))
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    return {"$schema": DRAFT, **schema}
 
 
-def _build(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, label: str) -> Case:
+def build_case(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, label: str) -> Case:
     tables = assemble(data, overrides, folder, label)
     try:
         case = Case.model_validate(tables)

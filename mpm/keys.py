@@ -48,6 +48,10 @@ class Value:
     text: str
     origin: str
     key: Key
+    path: Address
+    """The parts of the name, which may hold dots themselves."""
+    written: Any
+    """What a resolved case file holds: SI units as text, lists and numbers as they are."""
 
 
 def find_keys(name: str) -> list[Key]:
@@ -109,7 +113,7 @@ def values(case: Case) -> list[Value]:
             origin = "built-in"
         else:
             origin = "default" if key.default and not key.worked_out else "worked out"
-        found.append(Value(name, text_of(key, value), origin, key))
+        found.append(Value(name, text_of(key, value), origin, key, path, value))
     return found
 
 

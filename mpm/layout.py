@@ -248,7 +248,7 @@ class Geometry(Frozen):
 
     model_config = ConfigDict(json_schema_extra=_base_may_give_it)
 
-    base: str | None = Field(None, exclude=True)
+    base: str | None = Field(None, exclude=True, examples=["single_zone"])
     """a geometry to start from, the name of a built-in one or the path of a file; keys given here lie over it, list entries by name"""
     length: StripLength
     """length of the strip along the reactor"""

@@ -18,15 +18,16 @@ from pydantic_core import PydanticCustomError
 
 from mpm.chemistry import GasReaction, Mechanism, Site, Species, SurfaceReaction
 from mpm.equation import ARROW, parse_equation, write_equation
+from mpm.schema import DRAFT, finished
 from mpm.units import (
     LARGEST,
     Atoms,
     Density,
     Dimension,
-    Fraction,
     MolarEnergy,
     MolarMass,
     Number,
+    Sticking,
     Temperature,
     parse,
     reject,
@@ -111,7 +112,7 @@ class ReactionTable(_Table):
 
     equation: Annotated[str, Field(examples=["OH + TMA -> CH4 + OAl(CH3)2"])]
     """what reacts to what; elements and sites must balance. With a site on the left it is a surface reaction, else one in the gas"""
-    sticking: Fraction | None = None
+    sticking: Sticking | None = None
     """share of the collisions with a reactive site that react (surface reactions, in place of A)"""
     A: _RateConstant | None = None
     """rate constant before (T / reference_temperature)^b exp(-Ea / R T): a speed for a surface reaction, m^3/mol/s in the gas"""
@@ -138,6 +139,15 @@ class Chemistry(_Table):
     """solid products, by name"""
     reaction: dict[str, ReactionTable] = {}
     """reactions, by name; keys given here lie over the mechanism's, e.g. chemistry.reaction.tma.sticking = 0.1"""
+
+
+def mechanism_schema() -> dict[str, Any]:
+    """JSON Schema of a mechanism file, for editors: the tables of `[chemistry]`, each entry complete."""
+    schema = finished(Chemistry.model_json_schema())
+    del schema["properties"]["mechanism"]
+    for table, keys in (("SpeciesTable", ["molar_mass"]), ("ReactionTable", ["equation"])):
+        schema["$defs"][table]["required"] = keys
+    return {"$schema": DRAFT, **schema, "title": "Mechanism", "description": "A mechanism file of mpm."}
 
 
 _NAME = re.compile(r"[^\s.]+")

@@ -11,6 +11,9 @@ from typing import Any
 
 from mpm.units import parse
 
+DRAFT = "https://json-schema.org/draft/2020-12/schema"
+"""What a schema says of the language it is written in."""
+
 READ_IN: dict[str, tuple[tuple[float, str], ...]] = {
     "m": ((1e-6, "nm"), (1e-4, "um"), (10.0, "mm"), (math.inf, "m")),
     "m/s": ((1.0, "cm/s"), (math.inf, "m/s")),

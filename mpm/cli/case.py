@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -86,14 +86,41 @@ def check(
 
 
 @app.command()
-def schema() -> None:
-    """Print the JSON Schema of case files, for editors.
+def schema(
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="case (default), sweep, powder or mechanism")
+    ] = "case",
+) -> None:
+    """Print the JSON Schema of case files, or of others, for editors.
 
-    mpm schema > case.schema.json                  complete and check cases: "#:schema case.schema.json" on top of one
+    mpm schema > mpm-case.schema.json              complete and check cases: "#:schema ./mpm-case.schema.json" on top of one
+    mpm schema sweep > mpm-sweep.schema.json       the same for sweep files
     """
     import json
 
-    from mpm.case import case_schema
-
+    made = _schema(kind)
     if rank() == 0:
-        print(json.dumps(case_schema(), indent=2))
+        print(json.dumps(made, indent=2))
+
+
+def _schema(kind: str) -> dict[str, Any]:
+    if kind == "case":
+        from mpm import case
+
+        return case.case_schema()
+    if kind == "sweep":
+        from mpm.sweep.schema import sweep_schema
+
+        return sweep_schema()
+    if kind == "powder":
+        from mpm.dem.case import powder_schema
+
+        return powder_schema()
+    if kind == "mechanism":
+        from mpm.mechanism import mechanism_schema
+
+        return mechanism_schema()
+    from mpm.errors import InputError
+
+    kinds = ("case", "sweep", "powder", "mechanism")
+    raise InputError.at("mpm schema", "", repr(kind), ", ".join(kinds), given=kind, known=kinds)

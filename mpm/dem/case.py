@@ -19,8 +19,10 @@ from mpm.errors import InputError
 from mpm.gases import ideal_gas_density
 from mpm.kinds import POWDER, read_input
 from mpm.names import powder_file
+from mpm.schema import DRAFT, finished
 from mpm.units import (
     Density,
+    Diameter,
     Dimension,
     Length,
     MolarMass,
@@ -54,20 +56,34 @@ MOST_PARTICLES = 5_000_000
 class PowderInput(Section):
     """A built-in powder by name (`powder = "GL56"`), or one described or overridden key by key."""
 
-    base: str | None = None
-    diameter: Length | None = None
+    base: Annotated[str | None, Field(json_schema_extra={"enum": [*POWDERS]})] = None
+    """a built-in powder to start from: GL50, GL29, GL56, GL223 or SS231; keys given here lie over it"""
+    diameter: Diameter | None = None
+    """mean diameter of the particles"""
     deviation: Spread | None = None
+    """standard deviation of the diameters, by number"""
     density: Density | None = None
+    """density of the solid"""
     sphericity: Annotated[float, Dimension("", "a sphericity", "0.79", above=0.0, at_most=1.0)] | None = None
+    """surface of a sphere of the particle's volume over the particle's surface, in the drag"""
     friction: NonNegative | None = None
+    """coefficient of friction between particles"""
     wall_friction: NonNegative | None = None
+    """coefficient of friction between particle and base"""
     restitution: Restitution | None = None
+    """coefficient of restitution between particles"""
     wall_restitution: Restitution | None = None
+    """coefficient of restitution between particle and base"""
     hamaker: Hamaker | None = None
+    """Hamaker constant between particles; 0: no cohesion"""
     wall_hamaker: Hamaker | None = None
+    """Hamaker constant between particle and base"""
     asperity: Length | None = None
+    """height of the roughness in the Rumpf force"""
     stiffness: Stiffness | None = None
+    """spring stiffness of the real material, to which cohesion is scaled"""
     ergun: tuple[Positive, Positive] | None = None
+    """factors A and B of the drag law"""
 
     @field_validator("base")
     @classmethod
@@ -104,18 +120,31 @@ class BoxInput(Section):
     """
 
     length: Annotated[float, Dimension("", "diameters", "8", at_least=3.0)] = 12.0
+    """length of the periodic box along the conveyor, in mean particle diameters"""
     depth: Annotated[float, Dimension("", "diameters", "4", at_least=3.0)] = 5.0
+    """depth of the periodic box, in mean particle diameters"""
     height: Annotated[float, Dimension("", "diameters", "15", above=0.0)] = 15.0
+    """height of the settled bed, in mean particle diameters"""
     stiffness: Stiffness = 30.0
+    """spring stiffness of the contacts in the simulation: softer ones allow longer steps"""
     size_classes: Annotated[int, Field(ge=1, le=20)] = 5
+    """number of sizes that stand for the distribution"""
     cohesion: bool = True
+    """whether particles attract each other"""
     reduced_cohesion: bool = True
+    """scale the Hamaker constants with the spring, so that collisions stay alike; false: forces of the real material"""
     base: Literal["flat", "frit", "sawtooth"] = "flat"
-    frit_diameter: Length = 25e-6
+    """what the bed lies on: a flat plate, a frit (a glued monolayer of particles), or a sawtooth (a glued baffle)"""
+    frit_diameter: Diameter = 25e-6
+    """diameter of the glued particles"""
     baffle_height: Length = 2e-3
+    """height of the sawtooth"""
     baffle_width: Length = 2e-3
+    """length of the sawtooth along the conveyor"""
     declination: Tilt = 0.0
+    """angle by which the conveyor slopes down along its way"""
     steps_per_collision: Annotated[float, Dimension("", "steps", "14", at_least=1.0)] = 14.0
+    """time steps in the shortest collision"""
 
 
 class GasInput(Section):
@@ -129,11 +158,17 @@ class GasInput(Section):
     """
 
     velocity: Speed = 0.0
+    """superficial velocity of the gas from below"""
     frame: Literal["lab", "reactor"] = "lab"
+    """where the inlet of the gas rests: in the laboratory, or on the moving reactor"""
     viscosity: Viscosity = 18e-6
+    """dynamic viscosity of the gas"""
     molar_mass: MolarMass = 29e-3
+    """molar mass of the gas, in the inertial part of the drag"""
     temperature: Temperature = 293.15
+    """temperature of the gas"""
     pressure: Pressure = 101325.0
+    """pressure of the gas"""
 
     @property
     def density(self) -> float:
@@ -149,11 +184,17 @@ class RunInput(Section):
     """Cycles per seed (the first `discard` are not averaged), the seeds, and the sampling of a cycle."""
 
     seeds: tuple[Annotated[int, Field(ge=1)], ...] = (1, 2, 3)
+    """how many random packings (1, 2, ...), or a list of their numbers; the spread between them is the error"""
     cycles: Annotated[int, Field(ge=1)] = 8
+    """cycles of the vibration per packing"""
     discard: Annotated[int, Field(ge=0)] = 3
+    """first cycles that are not averaged"""
     updates_per_cycle: Annotated[int, Field(ge=64)] = 512
+    """steps of the acceleration in a cycle"""
     samples_per_cycle: Annotated[int, Field(ge=16)] = 128
+    """phases of the profile in a cycle, a divisor of updates_per_cycle"""
     dump_per_cycle: Annotated[int, Field(ge=0)] = 16
+    """particle positions written per cycle; 0: none"""
 
     @field_validator("seeds", mode="before")
     @classmethod
@@ -181,19 +222,28 @@ class ProfileInput(Section):
     """`mean_velocity`: scale the fitted profile to this cycle mean; `residence_length`: of the distribution."""
 
     mean_velocity: Speed | None = None
+    """scale the fitted profile to this mean: profile_scaled.csv"""
     residence_length: Length = 5e-3
+    """length of the bed that the residence times are given for"""
 
 
 class DemCase(Section):
     """A powder file."""
 
     title: str = "DEM substudy"
+    """a line that names the simulation"""
     powder: PowderInput
+    """the particles: the name of a built-in powder, or a table"""
     waveform: WaveformInput
+    """how the conveyor moves; its kind says which keys there are"""
     box: BoxInput = BoxInput()
+    """the periodic box, its bed, base and contacts"""
     gas: GasInput | None = None
+    """gas in the bed; left out: none"""
     run: RunInput = RunInput()
+    """packings, cycles and sampling"""
     profile: ProfileInput = ProfileInput()
+    """what is made of the velocity of the bed"""
     directory: Annotated[Path, Field(exclude=True)] = Path()
 
     @field_validator("powder", mode="before")
@@ -259,6 +309,25 @@ class DemCase(Section):
         for key in ("seeds", "cycles", "discard"):
             data["run"].pop(key)
         return hashlib.sha256(repr(data).encode()).hexdigest()[:16]
+
+
+def powder_schema() -> dict[str, Any]:
+    """JSON Schema of a powder file, for editors."""
+    schema = finished(DemCase.model_json_schema())
+    del schema["properties"]["directory"]
+    table = schema["properties"]["powder"]
+    schema["properties"]["powder"] = {
+        "description": table["description"],
+        "anyOf": [{"type": "string", "enum": [*POWDERS]}, {"$ref": table["$ref"]}],
+    }
+    seeds = schema["$defs"]["RunInput"]["properties"]["seeds"]
+    one = {"type": "integer", "minimum": 1, "maximum": MOST_SEEDS}
+    schema["$defs"]["RunInput"]["properties"]["seeds"] = {
+        "description": seeds["description"],
+        "default": 3,
+        "anyOf": [one, {"type": "array", "items": {"type": "integer", "minimum": 1}, "minItems": 1}],
+    }
+    return {"$schema": DRAFT, **schema}
 
 
 def load_case(source: Path | str | Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> DemCase:

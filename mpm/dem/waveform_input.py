@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mpm.units import Angle, Dimension, Frequency, Positive
+from mpm.units import Angle, Dimension, Frequency, Positive, worked_out
 
 from ..constants import GRAVITY
 from .accelerometer import fit_record, read_record
@@ -19,17 +19,22 @@ Inclination = Annotated[float, Dimension("rad", "an angle", "60 deg", above=0.0,
 class Section(BaseModel):
     """A table of a powder file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class SineInput(Section):
     """A pure sine of the vertical acceleration `gamma` g."""
 
     kind: Literal["sine"]
+    """which waveform this is"""
     gamma: Positive
+    """largest vertical acceleration over g"""
     frequency: Frequency
+    """frequency of the vibration"""
     angle: Inclination = math.pi / 3
+    """direction of the vibration, counted from angle_from"""
     angle_from: Literal["horizontal", "vertical"] = "horizontal"
+    """what the angle is counted from"""
 
     def build(self, directory: Path) -> Waveform:
         return sine(self.gamma, self.frequency, self.angle, self.angle_from)
@@ -39,11 +44,17 @@ class SawtoothInput(Section):
     """The pseudo-sawtooth with the displacement of a sine of the vertical acceleration `gamma` g."""
 
     kind: Literal["sawtooth"]
+    """which waveform this is"""
     gamma: Positive
+    """largest vertical acceleration, over g, of the sine of the same displacement"""
     frequency: Frequency
+    """frequency of the vibration"""
     angle: Inclination = math.pi / 4
+    """direction of the vibration, counted from angle_from"""
     angle_from: Literal["horizontal", "vertical"] = "horizontal"
+    """what the angle is counted from"""
     extension_ratio: Annotated[float, Dimension("", "f_a/f_1", "0.6667", above=0.5, below=1.0)] = 2.0 / 3.0
+    """frequency of the slow half sine out over that of the cycle, f_a / f_1"""
 
     def build(self, directory: Path) -> Waveform:
         like = sine(self.gamma, self.frequency, self.angle, self.angle_from)
@@ -57,8 +68,11 @@ class SeedInput(Section):
     """The seed's table 2.2: the first `harmonics` of each direction, scaled to the fundamental `gamma` g."""
 
     kind: Literal["seed"]
+    """which waveform this is"""
     harmonics: Annotated[int, Field(ge=1, le=3)] = 3
-    gamma: Positive | None = None
+    """how many harmonics of each direction"""
+    gamma: Positive | None = worked_out("as measured", None)
+    """vertical acceleration of the fundamental over g, to which all are scaled"""
 
     def build(self, directory: Path) -> Waveform:
         full = seed_table_2_2()
@@ -69,18 +83,27 @@ class SeedInput(Section):
 
 
 class HarmonicInput(Section):
+    """One harmonic of an acceleration."""
+
     amplitude: Acceleration
+    """amplitude of the acceleration"""
     frequency: Frequency
+    """frequency of the harmonic"""
     phase: Angle = -math.pi / 2
+    """phase in A cos(2 pi f t - phase)"""
 
 
 class HarmonicsInput(Section):
     """Lists of harmonics, `[[waveform.horizontal]]` and `[[waveform.vertical]]`; A cos(2 pi f t - phase)."""
 
     kind: Literal["harmonics"]
+    """which waveform this is"""
     frequency: Frequency
+    """frequency of the cycle"""
     horizontal: tuple[HarmonicInput, ...]
+    """harmonics of the acceleration along the reactor"""
     vertical: tuple[HarmonicInput, ...]
+    """harmonics of the vertical acceleration"""
 
     def build(self, directory: Path) -> Waveform:
         horizontal, vertical = (
@@ -94,9 +117,13 @@ class MeasuredInput(Section):
     """Accelerations from a CSV file of t, a_x, a_z: one period (`table`) or a record to be fitted."""
 
     kind: Literal["table", "accelerometer"]
+    """one period as a table, or a record of an accelerometer that harmonics are fitted to"""
     file: str
-    harmonics: Annotated[int, Field(ge=1, le=64)] | None = None
+    """path of the CSV file, relative to this one: columns t [s], a_y, a_z (along, vertical)"""
+    harmonics: Annotated[int, Field(ge=1, le=64)] | None = worked_out("16 of a table, 3 of a record", None)
+    """how many harmonics of each direction are kept"""
     unit: Literal["m/s^2", "g"] = "m/s^2"
+    """unit of the accelerations in the file"""
 
     def build(self, directory: Path) -> Waveform:
         record = read_record(directory / self.file, self.unit)
