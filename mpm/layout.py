@@ -230,7 +230,7 @@ class Zone(Frozen):
 
     name: Name
     """what the zone is called in results and in keys: letters, digits, _ and -"""
-    start: Position
+    start: Annotated[float, Dimension("m", "a position", "0 mm", at_least=0.0)]
     """left end of the zone, from the left end of the strip"""
     end: StripLength
     """right end of the zone, from the left end of the strip"""

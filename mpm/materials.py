@@ -18,10 +18,10 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, Wi
 from mpm.constants import AVOGADRO
 from mpm.units import (
     Conductivity,
+    Coverage,
     Density,
     Diameter,
     Dimension,
-    Fraction,
     HeatCapacity,
     Kozeny,
     PerLength,
@@ -125,7 +125,7 @@ class Material(BaseModel):
     """reactive surface per total volume of the layer: with site_density it decides how much precursor the layer takes up"""
     site_density: _Sites = SITE_DENSITIES["thesis"]
     """reactive sites per surface, a value or a preset: "thesis" is one site per 24 nm^2, "one-per-24-square-angstrom" 100 times as many"""
-    initial_coverage: dict[str, Fraction] = worked_out(
+    initial_coverage: dict[str, Coverage] = worked_out(
         "all sites are the mechanism's first one, the fresh surface", {}, example={"OH": 1.0}
     )
     """share of the sites in each state when the solids come in; they sum to 1"""

@@ -7,6 +7,7 @@ so that "139.7 mm" becomes the float 0.1397 and not its neighbour.
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from dataclasses import dataclass
@@ -61,6 +62,7 @@ _ANGLES = {"radian", "degree", "turn", "arcminute", "arcsecond", "revolutions_pe
 def _registry() -> Any:
     import pint
 
+    logging.getLogger("pint.util").setLevel(logging.ERROR)  # what it may be in other letters is ours to say
     registry = pint.UnitRegistry(non_int_type=Decimal, cache_folder=None)
     registry.define("@alias torr = Torr")  # the symbol; pint has the name only
     return registry
@@ -90,16 +92,15 @@ def parse(text: str, unit: str) -> float:
     number, symbol = match.groups()
     if not symbol:
         raise ValueError("no unit")
-    registry, wanted = _registry(), _registry().Unit(unit)
-    advice = _advice(symbol, wanted)
+    registry, wanted, written = _registry(), _registry().Unit(unit), symbol
     for spelling in ("degC", "degF", "deg"):
         symbol = _LOOK_ALIKES[spelling].sub(spelling, symbol)
     try:
         given = registry.Unit(symbol)
     except Exception as error:  # pint raises many types here, down to tokenizer errors
-        raise ValueError(f"unknown unit {symbol!r}{advice}") from error
+        raise ValueError(f"unknown unit {symbol!r}{_advice(written, wanted)}") from error
     if given.dimensionality != wanted.dimensionality or _counts_angle(given) != _counts_angle(wanted):
-        raise ValueError(f"{_dimension_text(given)}{advice}")
+        raise ValueError(f"{_dimension_text(given)}{_advice(written, wanted)}")
     if "inf" in number or "nan" in number:
         return float(number)
     if given == registry.degree:
@@ -300,5 +301,6 @@ Positive = Annotated[float, Dimension("", "a number", "1.5", above=0.0)]
 NonNegative = Annotated[float, Dimension("", "a number", "0.30", at_least=0.0)]
 Atoms = Annotated[float, Dimension("", "a number of atoms", "3", at_least=0.0)]
 Fraction = Annotated[float, Dimension("", "a fraction", "2e-4", at_least=0.0, at_most=1.0)]
+Coverage = Annotated[float, Dimension("", "a fraction", "1", at_least=0.0, at_most=1.0)]
 Sticking = Annotated[float, Dimension("", "a fraction", "0.01", at_least=0.0, at_most=1.0)]
 Porosity = Annotated[float, Dimension("", "a fraction", "0.46", above=0.0, below=1.0)]

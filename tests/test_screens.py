@@ -104,6 +104,13 @@ SCREENS: dict[str, list[str]] = {
     "run": ["run", "single_cycle", "-o", "again", "--overwrite", "--set", "geometry.cell_width=9 mm"],
     "run, steady": ["run", "single_zone", "-o", "still", "--no-report", "--overwrite", "--set", "fidelity=steady"],
     "resume": ["resume", "longer", "--end", "1.1 s"],
+    "list": ["list"],
+    "list materials": ["list", "materials"],
+    "list gases": ["list", "gases"],
+    "explain": ["explain"],
+    "explain, a table": ["explain", "material"],
+    "explain, a key": ["explain", "geometry.inlet.tma.velocity"],
+    "explain, a number": ["explain", "flow"],
     "plot": ["plot", "run"],
     "report": ["report", "run"],
     "report of two": ["report", "run", "run2"],
@@ -112,6 +119,8 @@ SCREENS: dict[str, list[str]] = {
     "--version": ["--version"],
 }  # fmt: skip
 """Calls whose screens are for people; those that compute do so on the tiny mesh."""
+PROSE = {"list", "explain", "explain, a table", "explain, a key", "explain, a number"}
+"""Those that explain: definitions such as `0: closed`, and titles that people have given."""
 LINES = {"plot", "report", "report of two", "sweep"}
 """Those that print paths and progress alone, which have no layout."""
 for _name in ("run", "run, steady"):
@@ -179,7 +188,8 @@ def test_screens(name: str, place: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     """Fails when a screen has a line longer than the terminal, a cut or broken word, or a number without unit that is no ratio or count."""
     piped, said = called(SCREENS[name], None, monkeypatch)
     assert piped.strip() or said.strip(), "nothing on the screen"
-    assert bare_numbers(piped + said) == CUT.findall(piped + said) == []
+    assert CUT.findall(piped + said) == []
+    assert name in PROSE or bare_numbers(piped + said) == []
     if name in LINES:
         return
     narrow = shown(SCREENS[name], 80, monkeypatch)

@@ -22,7 +22,7 @@ def list_(
         ),
     ] = None,
 ) -> None:
-    """List cases, materials, gases ... that have a name, and your runs.
+    """List what has a name (cases, materials, gases and more), and your runs.
 
     mpm list                 everything
     mpm list materials       one kind
