@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
+from rich.text import Text
 
 from mpm.checks import check_case
 from mpm.errors import ConvergenceError, Interrupted
-from mpm.screen import say, together
+from mpm.screen import lines_of, say, together
 from mpm.tables import print_summary
 from mpm.verdict import verdict
 
@@ -43,7 +44,7 @@ def print_next_steps(directory: Path, summary: dict[str, Any], console: Console,
 
 
 def print_steps(steps: Sequence[tuple[str, str]], console: Console) -> None:
-    """Commands, each whole, with what it does behind it as a comment or, where that leaves no room, above it."""
+    """Commands that can be copied, with what each does behind it as a comment or, where that leaves no room, above it."""
     say(console, "Next:")
     column = max((len(command) for command, _ in steps if 2 * len(command) < console.width), default=0) + 2
     for command, purpose in steps:
@@ -51,7 +52,9 @@ def print_steps(steps: Sequence[tuple[str, str]], console: Console) -> None:
             say(console, together(f"{command:{column}}") + f"# {purpose}", 2, column)
         else:
             say(console, f"# {purpose}:", 2)
-            say(console, command, 2)
+            words = (together(shlex.quote(word)) for word in shlex.split(command))
+            lines = lines_of(" ".join(words), console.width - 2, 2)
+            console.print(Text(" \\\n".join(lines)), soft_wrap=True)
 
 
 @contextmanager

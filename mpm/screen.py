@@ -24,6 +24,7 @@ WIDE = 100
 NARROW = 72
 """Columns below which a value follows its label instead of standing in a column."""
 HARD_SPACE = "\u00a0"
+_MEASURED = re.compile(r"(?<=\d) (?=[A-Za-z%])")
 
 
 def spell_out() -> None:
@@ -117,9 +118,12 @@ def say(console: Console, text: str, indent: int = 0, hang: int = 4, style: str 
 
 
 def lines_of(text: str, width: int, indent: int = 0, hang: int = 4) -> list[str]:
-    """`text` in lines of at most `width` columns, broken between words; a word that is longer has a line of its own."""
+    """`text` in lines of at most `width` columns, broken between words; a word that is longer has a line of its own.
+
+    A number stays with the word behind it, most often its unit.
+    """
     lines = textwrap.wrap(
-        text,
+        _MEASURED.sub(HARD_SPACE, text),
         width,
         initial_indent=" " * indent,
         subsequent_indent=" " * min(indent + hang, max(width - 20, 0)),

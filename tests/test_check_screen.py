@@ -1,6 +1,7 @@
 """What `mpm check` says of a case: values with units and origins, what is silent otherwise, each thing once."""
 
 import json
+import shlex
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from mpm.case import Case, load_case
 from mpm.checks import check_case
 from mpm.checkscreen import print_full, print_report
 from mpm.cli import main
+from mpm.nextsteps import print_steps
 from mpm.notes import notes, sites_per_square_nanometre, standard_flow
 
 from .test_screen import text_of
@@ -180,6 +182,10 @@ def test_the_next_step_is_named(
     monkeypatch.chdir(tmp_path)
     assert main(["check", "single_zone", "--set", "title=a b"]) == 0
     assert "mpm run single_zone --set 'title=a b'" in capsys.readouterr().out.splitlines()[-1]
+    command = "mpm run single_zone --set fidelity=resolved --set 'title=a b c d e f'"
+    lines = text_of(40, print_steps, [(command, "a run")]).splitlines()
+    typed = "\n".join(lines[1:]).replace(" \\\n", " ")  # as a shell reads it
+    assert shlex.split(typed, comments=True) == shlex.split(command) and len(lines) > 3
 
 
 def test_the_case_of_the_readme() -> None:

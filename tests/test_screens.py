@@ -111,6 +111,7 @@ SCREENS: dict[str, list[str]] = {
     "explain, a table": ["explain", "material"],
     "explain, a key": ["explain", "geometry.inlet.tma.velocity"],
     "explain, a number": ["explain", "flow"],
+    "compare": ["compare", "run", "run2"],
     "plot": ["plot", "run"],
     "report": ["report", "run"],
     "report of two": ["report", "run", "run2"],
@@ -144,7 +145,7 @@ HELPS = {" ".join([*path, "--help"]): [*path, "--help"] for path in commands(typ
 CUT = re.compile("\u2026|[^\\].A-Z ]\\.\\.\\.$", re.MULTILINE)
 """An ellipsis, or three points at the end of a line that close no list of arguments such as `[ARGS]...`."""
 BOXES = str.maketrans(dict.fromkeys("│┃┆|┏┓┗┛┡┩┳╇┴└┘┌┐├┤─━┬┼:,;()[]'\"#", " "))
-NUMBER = r"(?<![\w.^/)-])-?\d[\d,]*(?:\.\d+)?(?:e-?\d+)?(?![\w.^/(]|\+\d)"
+NUMBER = r"(?<![\w.^/)-])-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.^/(]|\+\d)"
 UNIT = (
     r"(?:(?:Pa s|[mcunk]?m|[mu]?s|min|h|%|K|Pa|Hz|deg|degC|GB|kJ/mol|g/mol|1/m|sccm/m|mol/m|umol/m|steps/s|square angstrom)(?![\w])"
     r"|(?:cm|mm|um|nm|m|kg|Pa|[mu]?mol|J|W|sites per|per)[ /^][\w/^ ]*)"
@@ -163,12 +164,16 @@ def bare_numbers(text: str) -> list[str]:
     """Clauses with a number that has no unit and is neither a ratio nor a count by its label or the words around it."""
     found = []
     for line in text.splitlines():
-        if "->" in line or line.startswith(("  mpm ", "  #")) or set(line) <= set("0123456789 "):
+        if (
+            re.search(r"\+.*->|->.*\+", line)
+            or line.startswith(("  mpm ", "  #"))
+            or set(line) <= set("0123456789 ")
+        ):
             continue  # equations, commands, the numbers of ports in a sketch
         label = re.split(r"\S(?::|  )", line.strip(), maxsplit=1)[0]
         for clause in re.split(r"[,;:] | \(|\)(?=$|[ ,;:])|  +# ", line):
             after = [clause[match.end() :] for match in re.finditer(NUMBER, clause)]
-            bare = [rest for rest in after if not re.match(rf"(?: (?:to|and|/) {NUMBER})*\s+{UNIT}", rest)]
+            bare = [rest for rest in after if not re.match(rf"(?: (?:to|and|/|->) {NUMBER})*\s+{UNIT}", rest)]
             told = f"{label} {clause}"
             if re.fullmatch(r" *\d\d? [A-Za-z][\w-]*", clause):
                 continue  # what the number of a port in a sketch stands for
