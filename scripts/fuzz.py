@@ -30,11 +30,12 @@ from rich.console import Console
 from mpm.case import load_case
 from mpm.caseio import built_in_files
 from mpm.checks import check_case
+from mpm.checkscreen import print_full, print_report
 from mpm.dem.case import load_case as load_powder
 from mpm.errors import InputError
 from mpm.sweep.plan import combinations, plan
 from mpm.sweep.sweepfile import read_sweep
-from mpm.tables import print_mesh, print_report
+from mpm.tables import print_mesh
 
 ROOT = Path(__file__).parents[1]
 FEW_POINTS = 8
@@ -251,6 +252,7 @@ def read_case(folder: Path, name: str = "case.toml") -> None:
     case = load_case(folder / name)
     console = Console(file=io.StringIO(), width=80, markup=False, emoji=False)
     print_report(case, check_case(case), console)
+    print_full(case, console)
     if case.geometry.columns * sum(layer.cells for layer in case.geometry.layers) < 1e5:
         print_mesh(case, console)
     if load_case(tomllib.loads(case.to_toml())).content_hash() != case.content_hash():
