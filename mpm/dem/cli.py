@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -12,15 +13,13 @@ from mpm.cli.help import HELP_NAMES, App, Verbs
 from mpm.errors import InputError
 from mpm.kinds import DEM_RUN, kind_of_directory, what_it_is
 from mpm.launcher import rank
+from mpm.screen import screen
 from mpm.settings import parse_settings
 
 from .accelerometer import fit_record, read_record, resample, spectrum
 from .case import load_case
 from .idle import idle_keys
 from .waveform import HarmonicWaveform, extension_velocity, peak_displacement
-
-SLIP = 0.01
-"""Mean free path over diameter above which gas slips at the surface of a particle, and drag falls (Loth, 2.a.3: by 2 %)."""
 
 
 class RunByDefault(Verbs):
@@ -94,60 +93,24 @@ def run(
     load_lammps()
     from mpi4py import MPI
 
-    from .run import interrupted, progress_bar, run_case
+    from .run import interrupted, run_case
+    from .screen import SeedsProgress, print_result, silent
 
     speaks = MPI.COMM_WORLD.rank == 0 and not quiet
-    report, close = progress_bar(case, speaks)
-    try:
-        summary = run_case(
-            case,
-            directory,
-            jobs=jobs or min(len(case.run.seeds), os.cpu_count() or 1),
-            resume=resume,
-            overwrite=overwrite,
-            report=report,
-        )
-    except KeyboardInterrupt:
-        raise interrupted(directory) from None
-    finally:
-        close()
+    with SeedsProgress(case) if speaks else nullcontext(silent) as report:
+        try:
+            summary = run_case(
+                case,
+                directory,
+                jobs=jobs or min(len(case.run.seeds), os.cpu_count() or 1),
+                resume=resume,
+                overwrite=overwrite,
+                report=report,
+            )
+        except KeyboardInterrupt:
+            raise interrupted(directory) from None
     if speaks:
-        typer.echo(_lines(summary, directory))
-
-
-def _lines(summary: dict[str, Any], directory: Path) -> str:
-    """The result in a few lines."""
-    speed, lift = summary["mean_velocity"], summary["liftoff"]
-    spread = f" ± {100 * speed['spread']:.2f}" if speed.get("spread") is not None else ""
-    seeds = ", ".join(f"{100 * v:.2f}" for v in speed["seeds"])
-    limits, bed = summary["limits"], summary["bed"]
-    flight = "no flight"
-    if lift.get("phase_deg") is not None:
-        flight = f"flies from {lift['phase_deg']:.0f} to {lift['contact_phase_deg']:.0f} deg"
-    return "\n".join(
-        [
-            f"mean velocity   {100 * speed['mean']:.2f}{spread} cm/s (seeds: {seeds})",
-            f"gamma           {limits['gamma']:.3g} (throw number {limits['throw_number']:.3g}); granular Bond numbers as simulated: "
-            f"pair {bed['simulated_bond_number_pair']:.3g}, base {bed['simulated_bond_number_base']:.3g} (real material: "
-            f"{bed['bond_number_pair']:.3g}, {bed['bond_number_base']:.3g})",
-            f"efficiency      {summary['efficiency']:.2f}; straight drop {100 * limits['straight_drop']:.2f}, "
-            f"perfect flight {100 * limits['perfect_flight']:.2f} cm/s",
-            f"bed             {flight}; {summary['coordination']['contacts_per_particle']:.1f} contacts per particle",
-            *_warnings(bed),
-            f"written         {directory / 'profile.csv'} (for motion.profile), summary.json, plots/",
-        ]
-    )
-
-
-def _warnings(bed: dict[str, Any]) -> list[str]:
-    """What a reader of the result must know about its limits."""
-    knudsen = bed.get("knudsen_number", 0.0)
-    if knudsen <= SLIP:
-        return []
-    return [
-        f"warning         the gas is rarefied (mean free path {1e6 * bed['mean_free_path']:.3g} um, {knudsen:.2g} of a diameter): "
-        "the drag is that of a continuum, which is too large here"
-    ]
+        print_result(summary, directory, screen())
 
 
 @app.command()

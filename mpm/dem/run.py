@@ -8,7 +8,6 @@ import shutil
 import signal
 import time
 import traceback
-from collections.abc import Callable
 from contextlib import ExitStack
 from functools import partial
 from importlib.metadata import version
@@ -24,14 +23,10 @@ from .analysis import Arrays, analyse
 from .box import Particles, load_lammps
 from .case import DemCase, load_case
 from .report import draw, write_summary, write_tables
+from .screen import Report, cycles_done, silent
 from .simulate import Simulation
 
 LOCK = "lock"  # the file in a directory that says that a run is at work
-Report = Callable[[int, float], None]  # (seed, cycles done)
-
-
-def silent(seed: int, cycles: float) -> None:
-    """No progress report."""
 
 
 def prepare(case: DemCase, directory: Path, resume: bool, overwrite: bool) -> IO[bytes]:
@@ -150,11 +145,11 @@ def _work(toml_path: Path, seed: int, resume: bool, messages: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
     last = 0.0
 
-    def progress(done: float) -> None:
+    def progress(done: float, doing: str) -> None:
         nonlocal last
         if time.monotonic() - last > 0.3:
             last = time.monotonic()
-            messages.put((seed, "cycles", done))
+            messages.put((seed, "cycles", (done, doing)))
 
     try:
         directory = seed_directory(toml_path.parent, seed)
@@ -225,7 +220,7 @@ def _side_by_side(case: DemCase, directory: Path, jobs: int, resume: bool, repor
             except queue.Empty:
                 continue
             if kind == "cycles":
-                report(seed, content)
+                report(seed, *content)
             elif kind == "failed":
                 raise type(content)(f"seed {seed}: {content}")
             elif kind == "crashed":
@@ -233,7 +228,7 @@ def _side_by_side(case: DemCase, directory: Path, jobs: int, resume: bool, repor
                     f"seed {seed}: {content} (traceback in {process_log(directory, seed)})"
                 )
             else:
-                report(seed, float(case.run.cycles))
+                report(seed, float(case.run.cycles), cycles_done(case.run.cycles, case.run.cycles))
                 active.pop(seed).join()
                 log = process_log(directory, seed)
                 if log.exists() and not log.stat().st_size:
@@ -275,24 +270,3 @@ def interrupted(directory: Path) -> Interrupted:
     return Interrupted(
         f"interrupted; whole cycles are kept, go on with: mpm dem {directory / 'case.toml'} -o {directory} --resume"
     )
-
-
-def progress_bar(case: DemCase, shown: bool) -> tuple[Report, Callable[[], None]]:
-    """(report, close): a bar on standard error over the cycles of all seeds, or nothing."""
-    if not shown:
-        return silent, (lambda: None)
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    from mpm.screen import screen
-
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:.1f}/{task.total:.0f} cycles"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=screen(stderr=True),
-    )
-    tasks = {seed: bar.add_task(f"seed {seed}", total=case.run.cycles) for seed in case.run.seeds}
-    bar.start()
-    return (lambda seed, cycles: bar.update(tasks[seed], completed=cycles)), bar.stop

@@ -17,10 +17,14 @@ from .box import Box, BoxSpec, Particles
 from .case import DemCase
 from .gas import GasDrag, slab_solids
 from .sampling import Recorder
+from .screen import cycles_done, settling
 from .waveform import Waveform
 
 SETTLE_BLOCKS = 60  # of half the time a particle needs to fall its diameter, at most
-Progress = Callable[[float], None]  # called with the number of cycles done
+AT_REST = (
+    0.005  # root mean square speed at which the filling has settled, over that of a fall by one diameter
+)
+Progress = Callable[[float, str], None]  # called with the number of cycles done and what is being done
 
 
 def build(case: DemCase, seed: int) -> tuple[BoxSpec, Filling]:
@@ -86,7 +90,7 @@ class Simulation:
         return self.directory / "state.npz"
 
     def run(
-        self, resume: bool = False, progress: Progress = lambda done: None
+        self, resume: bool = False, progress: Progress = lambda done, doing: None
     ) -> dict[str, np.ndarray] | None:
         """Simulate up to the case's number of cycles; returns the recorder's arrays on rank 0."""
         if self.rank == 0:
@@ -102,7 +106,7 @@ class Simulation:
             start = Particles.at_rest(self.filling.positions, self.filling.classes)
         with Box(self.spec, start, self.timestep, self.directory, self.comm) as box:
             if saved is None:
-                self._settle(box)
+                self._settle(box, progress)
                 self._end_cycle(box, 0)
             if self.gas is not None:
                 box.enable_drag()
@@ -113,10 +117,13 @@ class Simulation:
             for cycle in range(done, self.case.run.cycles):
                 self._cycle(box, cycle, progress)
                 self._end_cycle(box, cycle + 1)
-                progress(cycle + 1.0)
+                self._tell(progress, cycle + 1.0)
         return self.recorder.arrays() if self.rank == 0 else None
 
-    def _settle(self, box: Box) -> None:
+    def _tell(self, progress: Progress, done: float) -> None:
+        progress(done, cycles_done(done, self.case.run.cycles))
+
+    def _settle(self, box: Box, progress: Progress) -> None:
         """Let the filling fall under gravity and viscous damping until it rests."""
         d = self.spec.powder.diameter
         fall = math.sqrt(d / GRAVITY)
@@ -126,10 +133,11 @@ class Simulation:
         for _ in range(SETTLE_BLOCKS):
             box.run(block)
             state = box.snapshot()
-            rest = (
-                state is not None
-                and float(np.sqrt((state.velocity**2).sum(axis=1).mean())) < 0.005 * GRAVITY * fall
-            )
+            rest = False
+            if state is not None:
+                speed = float(np.sqrt((state.velocity**2).sum(axis=1).mean()))
+                rest = speed < AT_REST * GRAVITY * fall
+                progress(0.0, settling(speed, AT_REST * GRAVITY * fall))
             if self.comm is not None:
                 rest = self.comm.bcast(rest, root=0)
             if rest:
@@ -153,7 +161,7 @@ class Simulation:
             if (i + 1) % every == 0:
                 now = cycle + (i + 1) / run.updates_per_cycle
                 self._record(box, float(times[i + 1]), now)
-                progress(now)
+                self._tell(progress, now)
 
     def _record(self, box: Box, time: float, cycle: float) -> None:
         """Check and sample on rank 0; an impossible state is raised by every rank."""
