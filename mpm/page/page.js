@@ -35,6 +35,9 @@ function valueOf(field, level) {
   return field.log ? field.low * Math.pow(field.high / field.low, place) : field.low + place * (field.high - field.low);
 }
 
+// A title beside a colour bar, in lines that fit its length.
+const folded = (text) => text.replace(/(.{14,}?) /g, "$1<br>");
+
 class Viewer {
   constructor(element, film, others) {
     this.element = element;
@@ -131,7 +134,7 @@ class Viewer {
   heatmap(field, z, logarithmic) {
     const low = logarithmic ? Math.log10(field.low) : field.low, high = logarithmic ? Math.log10(field.high) : field.high;
     const short = field.label.replace(/ \(.*/, ""); // the whole of it stands in the list of fields
-    const bar = { title: { text: field.unit ? `${short} [${field.unit}]` : short, side: "right" }, thickness: 14, len: 1 };
+    const bar = { title: { text: folded(field.unit ? `${short} [${field.unit}]` : short), side: "right" }, thickness: 14, len: 1 };
     if (logarithmic) {
       bar.tickvals = []; bar.ticktext = [];
       for (let power = Math.ceil(low - 1e-9); power <= high; power++) { bar.tickvals.push(power); bar.ticktext.push(`1e${power}`); }
@@ -166,7 +169,7 @@ class Viewer {
     const span = plot.layout && plot.dataset.view === this.zoom.value ? plot.layout.yaxis.range : [low, high];
     plot.dataset.view = this.zoom.value;
     return {
-      margin: { l: 58, r: 20, t: 12, b: 38 }, font: FONT, shapes, plot_bgcolor: "#e9ecef",
+      margin: { l: 58, r: 130, t: 12, b: 38, autoexpand: false }, font: FONT, shapes, plot_bgcolor: "#e9ecef",
       xaxis: { title: { text: "x [mm]", standoff: 4 }, range: kept, zeroline: false, showgrid: false },
       yaxis: { title: { text: "y [mm]" }, range: span, zeroline: false, showgrid: false },
     };

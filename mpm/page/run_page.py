@@ -77,9 +77,7 @@ class RunPage:
         """What the reader must know about the pictures."""
         if self.viewer is None:
             return ""
-        parts = [
-            "Colour range fixed over time; drag to zoom, double click to go back; the bed is zone by zone under `zoom`."
-        ]
+        parts = ["The colour range is that of all times. Drag in a map to zoom in, double click to go back."]
         if self.viewer["every"] > 1:
             parts.append(f"Of the stored times one in {self.viewer['every']} is here.")
         if self.viewer["joined"] > 1:
