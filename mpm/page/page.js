@@ -151,7 +151,7 @@ class Viewer {
     const z = await this.values(this.lines, index, false, rows, columns), levels = this.film.streamLevels;
     if (levels.length < 2) return [];
     return [{
-      type: "contour", x: this.film.x, y: this.film.y, z, showscale: false, hoverinfo: "skip", line: { color: "rgba(255,255,255,.85)", width: 1 },
+      type: "contour", x: this.film.x, y: this.film.y, z, showscale: false, hoverinfo: "skip", line: { color: "rgba(255,255,255,.9)", width: 1 },
       autocontour: false, contours: { coloring: "none", start: levels[0], end: levels[levels.length - 1], size: levels[1] - levels[0] },
     }];
   }
@@ -169,7 +169,7 @@ class Viewer {
     const span = plot.layout && plot.dataset.view === this.zoom.value ? plot.layout.yaxis.range : [low, high];
     plot.dataset.view = this.zoom.value;
     return {
-      margin: { l: 58, r: 130, t: 12, b: 38, autoexpand: false }, font: FONT, shapes, plot_bgcolor: "#e9ecef",
+      margin: { l: 58, r: 130, t: 12, b: 38, autoexpand: false }, font: FONT, shapes, plot_bgcolor: "#c3cad3",
       xaxis: { title: { text: "x [mm]", standoff: 4 }, range: kept, zeroline: false, showgrid: false },
       yaxis: { title: { text: "y [mm]" }, range: span, zeroline: false, showgrid: false },
     };
