@@ -1,4 +1,4 @@
-# make demo: install, run the single-zone reactor, draw its pictures      make test: install, run all tests
+# make demo: install, run the single-zone reactor, write its page        make test: install, run all tests
 # make venv, lint, bench, lock, clean: see the comment at each target
 
 VENV ?= .venv
@@ -24,11 +24,11 @@ $(VENV)/.installed: requirements.lock pyproject.toml scripts/venv.sh
 	@scripts/venv.sh $(VENV)
 	@touch $@
 
-# A TMA zone of 139.7 mm: 20 s of a vibrating bed on 28,359 cells, then its pictures.
+# A TMA zone of 139.7 mm: 20 s of a vibrating bed on 28,359 cells, its page and its pictures.
 demo: venv
 	mpm run cases/single_zone.toml -o $(DEMO) --overwrite
 	mpm plot $(DEMO)
-	@echo "Pictures: $(DEMO)/plots   numbers: $(DEMO)/summary.json   ParaView: $(DEMO)/fields.pvd"
+	@echo "Page: $(DEMO)/report.html   pictures: $(DEMO)/plots   numbers: $(DEMO)/summary.json   ParaView: $(DEMO)/fields.pvd"
 
 # All tests serially, then those marked `parallel` on 2 and on 3 ranks. More ranks than cores should sleep while they wait
 # (a setting of MPICH): else each message waits for the time slice of a rank that only polls.
