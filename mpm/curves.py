@@ -117,7 +117,7 @@ def outlets_figure(run: Run) -> Figure:
     title_of(figure, f"{name_of(run)}: gas that leaves the outlets (flux-weighted)")
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     species = list(run.case.mechanism.species_names)
-    missing: dict[str, list[str]] = {}
+    missing: dict[str, dict[str, list[str]]] = {}
     for panel, name in zip(axes.flat, names, strict=False):
         for one, values in outlet_species(run, name).items():
             if np.any(values > BELOW * largest):
@@ -130,7 +130,7 @@ def outlets_figure(run: Run) -> Figure:
                 )
             else:
                 why = f"below {BELOW * largest:.0e}" if np.any(values > 0.0) else "zero throughout"
-                missing.setdefault(f"{why} in {literal(name)}", []).append(formula(one))
+                missing.setdefault(why, {}).setdefault(formula(one), []).append(literal(name))
         panel.set_title(literal(f"outlet {name}"), fontsize=9)
         panel.grid(alpha=0.25)
     axes[0, 0].set_ylim(largest * BELOW, largest * 3.0)
@@ -138,7 +138,14 @@ def outlets_figure(run: Run) -> Figure:
     for panel in axes[:, 0]:
         panel.set_ylabel("mole fraction")
     shared_legend(figure)
-    note(figure, missing)
+    told = {
+        why: [
+            f"{one} {'anywhere' if len(where) == len(names) else 'in ' + ', '.join(where)}"
+            for one, where in found.items()
+        ]
+        for why, found in missing.items()
+    }
+    note(figure, told)
     return figure
 
 
@@ -250,7 +257,8 @@ def blank_rest(axes: NDArray[np.object_], used: int, xlabel: str = "") -> None:
 
 
 def note(figure: Figure, missing: Mapping[str, Sequence[str]]) -> None:
-    """Below the picture: curves that a logarithmic axis cannot show, by the reason."""
-    told = [f"{why}: {', '.join(names)}" for why, names in missing.items() if names]
+    """Below the picture, in lines of its width: curves that a logarithmic axis cannot show, by the reason."""
+    told = "; ".join(f"{why}: {', '.join(names)}" for why, names in missing.items() if names)
     if told:
-        figure.supxlabel("Not drawn: " + "; ".join(told), fontsize=7.5, color="0.35")
+        lines = textwrap.wrap(f"Not drawn: {told}", int(15.0 * figure.get_figwidth()))
+        figure.supxlabel("\n".join(lines), fontsize=7.5, color="0.35")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib import animation, style
+from rich.progress import track
 
 from mpm.errors import InputError
 from mpm.fieldnames import Limits
@@ -13,6 +14,7 @@ from mpm.files import replacing
 from mpm.maps import Map, limits_of
 from mpm.pictures import STYLE, Fields
 from mpm.results import Run
+from mpm.screen import screen
 
 SECONDS = 8.0
 """How long a movie is to last, if that gives a rate between those below."""
@@ -56,7 +58,15 @@ def _film(film: Map, fields: Fields, indices: Sequence[int], path: Path) -> None
     figure = film.show(next(iter(fields.at(indices[:1]))))
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
+    console = screen(stderr=True)
     with writer.saving(figure, str(path), DPI):
-        for snapshot in fields.at(indices):
+        for snapshot in track(
+            fields.at(indices),
+            "movie",
+            len(indices),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        ):
             film.show(snapshot)
             writer.grab_frame()

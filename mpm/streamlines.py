@@ -58,8 +58,12 @@ def _between_colours(grid: Grid, psi: Floats) -> float:
     return float(np.median(sign * bends)) if bends.size else 0.0
 
 
-def stream_levels(grid: Grid, psi: Floats, count: int = 24) -> Floats:
-    """About `count` evenly spaced values of psi to draw lines of; none where the gas stands still.
+LINES = 24
+"""Streamlines in a strip of one or two zones; in longer ones half as many in each."""
+
+
+def stream_levels(grid: Grid, psi: Floats) -> Floats:
+    """About `LINES` evenly spaced values of psi to draw lines of; none where the gas stands still.
 
     They keep half a spacing from the bottom wall's psi, and in a periodic strip they divide what flows upwards evenly, so that a line
     that leaves at one end enters at the other.
@@ -68,7 +72,7 @@ def stream_levels(grid: Grid, psi: Floats, count: int = 24) -> Floats:
     through = abs(float(psi[0, -1] - psi[0, 0])) if grid.periodic else 0.0
     if high - low <= 0.0:
         return np.empty(0)
-    spacing = (high - low) / count
+    spacing = (high - low) / (LINES * max(1.0, 0.5 * float(grid.zone_of_column.max())))
     if through > spacing:
         spacing = through / (2 * max(1, round(through / spacing / 2)))
     first, last = np.ceil(low / spacing - 0.5), np.floor(high / spacing - 0.5)

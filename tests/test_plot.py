@@ -280,7 +280,7 @@ def test_an_outlet_legend_names_drawn_curves_alone(cycle: Run) -> None:
     assert {text.get_text() for text in legend.get_texts()} == {
         formula(name) for name in cycle.case.mechanism.species_names if name != "TMA"
     }
-    assert not_drawn(figure) == "Not drawn: zero throughout in zone1: TMA; below 4e-12 in zone2: TMA"
+    assert not_drawn(figure) == "Not drawn: zero throughout: TMA in zone1; below 4e-12: TMA in zone2"
 
 
 def test_exit_profile_is_the_last_column_of_the_zone(cycle: Run) -> None:

@@ -84,7 +84,7 @@ def test_one_column() -> None:
 
 
 def test_levels_divide_the_flow_and_keep_off_the_walls() -> None:
-    """Fails when lines do not go on across the seam of a periodic strip, lie on a wall, or are drawn where nothing flows."""
+    """Fails when lines end at the seam of a periodic strip, lie on a wall, are drawn where nothing flows, or get rare in a long strip."""
     strip = grid()
     psi = through_ports(strip.x[None, :], strip.y[:, None])
     levels = stream_levels(strip, psi)
@@ -94,3 +94,5 @@ def test_levels_divide_the_flow_and_keep_off_the_walls() -> None:
     on_walls = np.array([0.0, -1e-4])  # of the bottom wall, left and right of the slot
     assert np.abs(levels[:, None] - on_walls).min() > 0.4 * spacing[0]
     assert len(stream_levels(strip, np.zeros_like(psi))) == 0
+    eight_zones = replace(strip, zone_of_column=np.full(strip.columns, 8))
+    assert len(stream_levels(eight_zones, psi)) == pytest.approx(4 * len(levels), rel=0.1)

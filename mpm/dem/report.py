@@ -111,6 +111,7 @@ def draw(
     }
     if scene is not None:
         figures["bed"] = _bed(*scene)
+        figures["bed"].suptitle(literal(case.title), fontsize=10)
     paths = []
     for name, figure in figures.items():
         path = plots / f"{name}.png"
@@ -165,7 +166,7 @@ def _voidage(case: DemCase, results: Results) -> Figure:
     highest = results.heights[results.solid.max(axis=0) > 0.01].max() / d
     axis.set(
         xlabel="phase [deg]",
-        ylabel="height above the base [d]",
+        ylabel="height above the base [particle diameters]",
         title=literal(case.title),
         ylim=(0, highest + 2),
     )
@@ -183,7 +184,7 @@ def _depth(case: DemCase, results: Results) -> Figure:
     )
     axis.set(
         xlabel="mean velocity along the base [cm/s]",
-        ylabel="height above the base [d]",
+        ylabel="height above the base [particle diameters]",
         title=literal(case.title),
     )
     return figure
@@ -193,7 +194,9 @@ def _residence(case: DemCase, results: Results) -> Figure:
     figure = Figure(figsize=(4.5, 3.4), layout="constrained")
     axis = figure.subplots()
     times = results.residence[np.isfinite(results.residence)]
-    if len(times):
+    if not len(times):
+        axis.text(0.5, 0.5, "no particle has come so far", ha="center", transform=axis.transAxes)
+    else:
         axis.hist(times, bins=40, range=(0.0, float(np.quantile(times, 0.98))), color=BED)
     length = 1e3 * case.profile.residence_length
     axis.set(xlabel=f"time to travel {length:g} mm [s]", ylabel="particles", title=literal(case.title))
