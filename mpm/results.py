@@ -56,11 +56,15 @@ class Run:
         return found
 
     def field(self, snapshot: Snapshot, name: str) -> Floats:
-        """A cell field as (rows, columns), bottom row first."""
+        """A cell field as (rows, columns), bottom row first; of a vector (rows, columns, 2). Raises InputError with the nearest name."""
         if name not in snapshot.cell_data:
-            known = ", ".join(snapshot.cell_data)
-            raise InputError(f"{self.directory.pvd}: no field {name!r}; there are {known}")
-        return snapshot.cell_data[name].astype(float).reshape(self.grid.rows, self.grid.columns)
+            known = list(snapshot.cell_data)
+            raise InputError.at(
+                self.directory.pvd, "field", repr(name), ", ".join(known), known=known, given=name
+            )
+        values = snapshot.cell_data[name].astype(float)
+        shape = (self.grid.rows, self.grid.columns)
+        return values.reshape(shape) if values.ndim == 1 else values[:, :2].reshape(*shape, 2)
 
     def report(self, output: str | Path | None = None) -> Path:
         """Write one page with everything about this run (`mpm report`), by default its `report.html`; returns its path."""

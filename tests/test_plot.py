@@ -357,6 +357,15 @@ def test_not_a_run_is_bad_input(tmp_path: Path) -> None:
         plot_run(tmp_path)
 
 
+def test_a_vector_is_read_as_two_components(zone: Run) -> None:
+    """Fails when the velocity of a run that is read back has another shape than that of a result, or is no velocity."""
+    velocity = zone.field(zone.snapshot(), "velocity")
+    assert velocity.shape == (zone.grid.rows, zone.grid.columns, 2)
+    assert np.allclose(velocity, (-0.03, 0.0))
+    with pytest.raises(InputError, match=r"found 'Velocity'.*did you mean velocity"):
+        zone.field(zone.snapshot(), "Velocity")
+
+
 def test_missing_field_names_those_that_exist(zone: Run) -> None:
     """Fails when the message does not say what could have been asked for."""
     with pytest.raises(InputError, match=r"x_CO.*x_TMA"):
