@@ -470,6 +470,12 @@ class Case(Frozen):
             content["motion"]["profile"] = read_text(self.motion.profile)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from mpm.notebook import case_html
+
+        return case_html(self)
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Case) and self.to_dict() == other.to_dict()
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Self
 from rich.status import Status
 from rich.text import Text
 
+from mpm.notebook import LiveLine, in_notebook
 from mpm.parallel import is_root
 from mpm.screen import say, screen, spinner
 
@@ -53,26 +54,39 @@ def log_file(log: logging.Logger, path: Path | None) -> Iterator[None]:
 
 
 class Progress:
-    """Shows how `reactor` gets on: a line that renews itself on a terminal, a line every ten seconds elsewhere."""
+    """Shows how `reactor` gets on: a line that renews itself on a terminal and in a notebook, a line every ten seconds elsewhere.
 
-    def __init__(self, reactor: Reactor, shown: bool):
+    shown: None for where somebody watches.
+    """
+
+    def __init__(self, reactor: Reactor, shown: bool | None):
         self.reactor = reactor
-        self.shown = shown and is_root(reactor.comm)
         self.console = screen(stderr=True)
-        self.interval = 0.2 if self.console.is_terminal else 10.0
-        self.status: Status | None = None
+        live = self.console.is_terminal or in_notebook()
+        self.shown = is_root(reactor.comm) and (live if shown is None else shown)
+        self.interval = 0.2 if live else 10.0
+        self.status: Status | LiveLine | None = None
         self.first: tuple[float, int] | None = None
         self.printed = clock.monotonic()
 
     def __enter__(self) -> Self:
-        if self.shown and self.console.is_terminal:
+        if self.shown and in_notebook():
+            self.status = LiveLine()
+        elif self.shown and self.console.is_terminal:
             self.status = self.console.status("starting", spinner=spinner(self.console))
             self.status.start()
         return self
 
+    @property
+    def stays(self) -> bool:
+        """Whether the live line is still there at the end."""
+        return isinstance(self.status, LiveLine)
+
     def warn(self, text: str) -> None:
         """A line that stays, for the person who watches."""
-        if self.shown:
+        if self.stays:
+            print(f"warning: {text}")  # the cell's own output, which wraps
+        elif self.shown:
             say(self.console, f"warning: {text}")
 
     def __exit__(
@@ -80,7 +94,7 @@ class Progress:
     ) -> None:
         if self.shown:
             self._print(force=True)
-        if self.status is not None:
+        if isinstance(self.status, Status):
             self.status.stop()
 
     def say(self, text: str) -> None:
@@ -105,7 +119,7 @@ class Progress:
         text = self.line()
         if self.status is not None:
             self.status.update(Text(text))
-        if text and (self.status is None or force):
+        if text and not self.stays and (self.status is None or force):
             self.console.print(text)
 
     def line(self) -> str:

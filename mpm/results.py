@@ -15,9 +15,11 @@ from mpm.errors import InputError, MpmError
 from mpm.geometry import Grid
 from mpm.kinds import RUN, kind_of_directory, what_it_is
 from mpm.output import RunDirectory
-from mpm.vtu import Snapshot
+from mpm.vtu import Snapshot, grid_points, grid_quads
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from mpm.case import Inlet
 
 Floats = NDArray[np.float64]
@@ -66,11 +68,59 @@ class Run:
         shape = (self.grid.rows, self.grid.columns)
         return values.reshape(shape) if values.ndim == 1 else values[:, :2].reshape(*shape, 2)
 
+    def plot(self, name: str | None = None, **options: Any) -> Figure:
+        """A picture: of a field at the last stored time or the one nearest to `time` [s] (with `clim`, `streamlines` as `mpm plot` has
+        them), by default the coverage; one of the standard pictures (`history`, `outlets`, ...); or a number of the history over time.
+
+        `theta`, `x`, `C` alone are those of the first dosing inlet. Raises InputError for another name, with the nearest.
+        """
+        from mpm.interactive import figure_of
+
+        return figure_of(self, name, **options)
+
+    def __repr__(self) -> str:
+        from mpm.verdict import verdict
+
+        said = verdict(self.case, self.summary) if self.summary else "not ended yet"
+        return f"Run {self.directory.path}: {said}"
+
+    def _repr_html_(self) -> str:
+        from mpm.notebook import result_html
+
+        return result_html(self.case, self.summary, str(self.directory.path))
+
     def report(self, output: str | Path | None = None) -> Path:
         """Write one page with everything about this run (`mpm report`), by default its `report.html`; returns its path."""
         from mpm.page import report
 
         return report(self.directory.path, output)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LastInstant(Run):
+    """A run that has no directory: what is in memory at its end."""
+
+    held: Snapshot
+
+    @classmethod
+    def of(
+        cls,
+        case: Case,
+        grid: Grid,
+        history: Mapping[str, Floats],
+        summary: Mapping[str, Any],
+        fields: Mapping[str, Floats],
+        time: float,
+    ) -> LastInstant:
+        """`fields`: those of the last instant, at `time` [s], in the grid's order."""
+        points, quads = grid_points(grid.x, grid.y), grid_quads(grid.columns, grid.rows)
+        held = Snapshot(points, quads, dict(fields), time)
+        where = RunDirectory("last instant")
+        return cls(where, case, grid, history, summary, [(time, "")], {}, held)
+
+    def snapshot(self, index: int = -1) -> Snapshot:
+        """The last instant, the only one."""
+        return self.held
 
 
 def load_run(directory: str | Path, say: Callable[[str], None] | None = None) -> Run:
