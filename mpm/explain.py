@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from mpm.catalogue import sections
 from mpm.errors import InputError
 from mpm.keys import Key, all_keys, find_keys, keys_of, unknown_key
 from mpm.quantities import QUANTITIES, Quantity, known, quantity
@@ -30,13 +31,13 @@ _LABEL = 12
 
 
 def explain(name: str) -> list[Line]:
-    """What is known of a name. Raises InputError with the nearest names when it is neither a key nor a number."""
+    """What is known of a name. Raises InputError with the nearest names when it is no key, no number and nothing that `mpm list` has."""
     keys = find_keys(name)
     numbers = [quantity(name)] if known(name) else _numbers(name)
-    if not keys and not numbers:
+    lines: list[Line] = [] if keys or numbers else _built_in(name)
+    if not keys and not numbers and not lines:
         others = [number.name for number in QUANTITIES]
         raise InputError(f"mpm explain: {unknown_key(name, others)}; mpm explain alone lists them all")
-    lines: list[Line] = []
     for key in keys:
         lines += [*([_BLANK] if lines else []), *(_table(key) if key.is_table else _key(key))]
     if numbers:
@@ -121,6 +122,20 @@ def _table(key: Key) -> Iterator[Line]:
 def _plain(text: str) -> str:
     """A value as TOML writes it, without the quotes."""
     return text.strip('"')
+
+
+def _built_in(name: str) -> list[Line]:
+    """What comes with mpm under this name: a material, a gas and so on."""
+    return [
+        line
+        for section in sections()
+        for entry in section.entries
+        if entry.name == name
+        for line in (
+            (0, f"{name}, one of the {section.title.lower()}: {section.use}", 4),
+            (2, entry.facts, 0),
+        )
+    ]
 
 
 def _numbers(name: str) -> list[Quantity]:

@@ -36,10 +36,7 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
             given=context.get("given", ""),
         )
     if kind == "extra_forbidden":
-        known = known_keys(model, location[:-1])
-        return InputError.at(
-            source, key, "an unknown key", f"one of {', '.join(known)}", known=known, given=str(location[-1])
-        )
+        return _unknown(source, key, str(location[-1]), known_keys(model, location[:-1]))
     if kind == "missing":
         return _missing(source, key, _expected(_field(model, location)), location, data)
     found = describe(first["input"])
@@ -48,6 +45,18 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
         return InputError.at(source, key, found, ", ".join(choices), known=choices, given=str(first["input"]))
     text = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     return InputError.at(source, key, found, _WORDS.get(kind, text), given="")
+
+
+def _unknown(source: str, key: str, given: str, known: Sequence[str]) -> InputError:
+    """A key is unknown here: misspelt, or the key of another table of a case."""
+    from mpm.keytable import all_keys  # which needs the classes that call this
+
+    accepted = f"one of {', '.join(known)}"
+    elsewhere = [entry.name for entry in all_keys() if entry.last == given]
+    if elsewhere:
+        accepted += f"; {given} belongs elsewhere: {', '.join(elsewhere)}"
+        return InputError.at(source, key, "an unknown key", accepted, given="")
+    return InputError.at(source, key, "an unknown key", accepted, known=known, given=given)
 
 
 def _missing(source: str, key: str, accepted: str, location: Sequence[int | str], data: Any) -> InputError:

@@ -161,3 +161,11 @@ def test_links_lead_somewhere(document: str) -> None:
     text = (ROOT / document).read_text(encoding="utf-8")
     links = [link for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text) if "://" not in link]
     assert [link for link in links if not (ROOT / document).parent.joinpath(link).exists()] == []
+
+
+def test_reference_of_the_case_file_is_that_of_the_program() -> None:
+    """Fails when a key or its description has changed since `python scripts/case_file.py` has written docs/case_file.md."""
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import case_file
+
+    assert (ROOT / "docs" / "case_file.md").read_text(encoding="utf-8") == case_file.reference()

@@ -239,6 +239,7 @@ def test_every_reported_number_is_explained(number, capsys: pytest.CaptureFixtur
         ([], 0, ["geometry.inlet: name, side, center", "titration: <inlet>.exit_mean"]),
         (["motion.gama"], 2, ["did you mean motion.gamma?", "mpm explain alone"]),
         (["titration.tma.exit_maen"], 2, ["did you mean titration.<inlet>.exit_mean?"]),
+        (["glass_beads"], 0, ["one of the materials", "porosity 0.46"]),
         (["nonsense"], 2, ["a dotted key such as motion.gamma, or a table: geometry"]),
     ],
 )  # fmt: skip
