@@ -135,7 +135,7 @@ class Progress:
         remaining = [f"{duration(to_do / speed)} left"] if speed and to_do else ["done"] if not to_do else []
         return ", ".join(
             [
-                f"{reactor.time:.2f} of {reactor.case.time.end:g} s",
+                f"{reactor.time:.{2 if reactor.time < 1e3 else 1}f} of {reactor.case.time.end:g} s",
                 f"step {reactor.steps}",
                 f"{speed:.1f} steps/s",
                 *remaining,

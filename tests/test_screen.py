@@ -7,7 +7,9 @@ import re
 import shlex
 import subprocess
 import sys
+import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,11 +21,13 @@ from mpm.checkscreen import print_report
 from mpm.cli import main
 from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
 from mpm.nextsteps import how_to_go_on
-from mpm.progress import duration
+from mpm.progress import Progress, duration
 from mpm.screen import Listing, screen
 from mpm.tables import print_mesh, print_summary
 
 from .cases import SHORT, TINY
+
+from mpi4py import MPI  # isort: skip  (after mpm.fem)
 
 EXAMPLE = (Path(__file__).parent / "example_case.toml").read_text(encoding="utf-8")
 
@@ -212,6 +216,19 @@ def test_a_steady_summary_is_per_second() -> None:
 )
 def test_time_to_wait(seconds: float, text: str) -> None:
     assert duration(seconds) == text
+
+
+def test_the_live_line_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when the line of a long run, with its spinner, takes more than 80 columns, or the time left is a row of seconds."""
+    reactor = SimpleNamespace(
+        comm=MPI.COMM_SELF, steps=114_812, time=1234.567, numbers={"balance.TMA": 3.2e-13}, schedule=SimpleNamespace(steps=9_999_999),
+        case=SimpleNamespace(time=SimpleNamespace(end=20000.0)),
+    )  # fmt: skip
+    progress = Progress(reactor, False)  # type: ignore[arg-type]
+    progress.first = (time.monotonic() - 1000.0, 100_000)
+    line = progress.line()
+    assert line.startswith("1234.6 of 20000 s, step 114812, 14.8 steps/s, 7 d 17 h left, balances to 3e-13")
+    assert len(line) <= 78
 
 
 def test_a_finished_run_names_the_next_steps(

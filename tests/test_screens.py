@@ -55,6 +55,8 @@ def called(arguments: list[str], columns: int | None, monkeypatch: pytest.Monkey
     if arguments[0] == "resume":  # always the same run
         shutil.rmtree(arguments[1], ignore_errors=True)
         shutil.copytree("run", arguments[1])
+    elif arguments[0] == "new":  # which writes over nothing
+        Path(arguments[1]).unlink(missing_ok=True)
     with monkeypatch.context() as patch:
         patch.setenv("COLUMNS", str(columns or 80))
         patch.setenv("TERM", "xterm")
@@ -104,6 +106,8 @@ SCREENS: dict[str, list[str]] = {
     "run": ["run", "single_cycle", "-o", "again", "--overwrite", "--set", "geometry.cell_width=9 mm"],
     "run, steady": ["run", "single_zone", "-o", "still", "--no-report", "--overwrite", "--set", "fidelity=steady"],
     "resume": ["resume", "longer", "--end", "1.1 s"],
+    "watch": ["watch", "run"],
+    "new": ["new", "mine.toml"],
     "list": ["list"],
     "list materials": ["list", "materials"],
     "list gases": ["list", "gases"],
