@@ -69,11 +69,13 @@ def kind_of_directory(path: Path) -> Kind | None:
     """What a directory holds; None for one that mpm has not written."""
     if any((path / name).exists() for name in ("sweep.json", "driver")):
         return SWEEP_RUN
+    if (path / "points.csv").exists() and not (path / "run.log").exists():
+        return SEARCH
     if not (path / "case.toml").is_file():
         return None
     if any(path.glob("seed_*")):
         return DEM_RUN
-    return SEARCH if (path / "points.csv").exists() and not (path / "run.log").exists() else RUN
+    return RUN
 
 
 def what_it_is(path: Path) -> str:

@@ -27,6 +27,7 @@ from scipy.optimize import minimize
 from mpm.engineering import inlet_excess
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
+from mpm.kinds import SEARCH, kind_of_directory, what_it_is
 from mpm.reactor import Reactor
 from mpm.replay import Replay
 
@@ -59,11 +60,13 @@ class Dose:
 
 @dataclass(frozen=True)
 class Point:
-    """One steady state: the doses by key, `exits` the mean exit coverage by inlet, `fed` precursor and `cvd` events [mol per metre of
-    depth and second]."""
+    """One steady state: the doses by key; by inlet the mean exit coverage `exits`, the dose `ratios` and the `excess` numbers (molecules
+    per site); `fed` precursor and `cvd` events [mol per metre of depth and second]."""
 
     doses: Mapping[str, float]
     exits: Mapping[str, float]
+    ratios: Mapping[str, float]
+    excess: Mapping[str, float]
     fed: float
     cvd: float
 
@@ -144,7 +147,7 @@ class Search:
     """Steady states of `case` at chosen doses; every one is kept in `points`. The flow is found again only when a velocity changes."""
 
     def __init__(self, case: Case, doses: list[Dose], target: float, weight: float):
-        self.case, self.doses = case.with_({"fidelity": "steady"}), doses
+        self.case, self.doses, self.fidelity = case.with_({"fidelity": "steady"}), doses, case.fidelity
         self.target, self.weight = target, weight
         self.points: list[Point] = []
         self._flow: tuple[tuple[float, ...], Replay] | None = None
@@ -178,6 +181,8 @@ class Search:
         point = Point(
             doses,
             {name: entry["exit_mean"] for name, entry in summary["titration"].items()},
+            summary["dose_ratio"],
+            summary["excess_number"],
             sum(summary["species"][name]["fed"] for name in dosed),
             summary.get("cvd", {}).get("total", 0.0),  # absent without a gas-phase reaction
         )
@@ -191,6 +196,63 @@ class Search:
     def best(self) -> Point | None:
         """The cheapest point that reaches the target."""
         return min((p for p in self.points if p.reaches(self.target)), key=self.cost, default=None)
+
+    def found(self) -> Point:
+        """The best point. Raises ConvergenceError when no dose has reached the target, with how near the search came and why it ended."""
+        best = self.best()
+        if best is not None:
+            return best
+        nearest = max(self.points, key=lambda p: min(p.exits.values()))
+        exits = ", ".join(f"{name} {value:.4f}" for name, value in nearest.exits.items())
+        richest = [d.key for d in self.doses if nearest.doses[d.key] > 0.99 * d.highest]
+        limited = f"; the highest dose that is tried is reached: {', '.join(richest)}" if richest else ""
+        raise ConvergenceError(
+            f"optimise: the target is not reached: none of {states(len(self.points))} has a coverage of {self.target:g} at every "
+            f"exit; the nearest has {exits}{limited}; try a lower --target, a higher --limit, --velocities, or a slower bed"
+        )
+
+    def best_case(self) -> Case:
+        """The case as it was given, with the best doses."""
+        return self.case_at(self.found().doses).with_({"fidelity": self.fidelity})
+
+    def run(self, limit: int, watch: Callable[[Point], None] = lambda point: None) -> None:
+        """Look for the cheapest doses with `limit` steady states at most; all are kept in `points`, and told to `watch`.
+
+        Raises ConvergenceError when the first one is not found.
+        """
+        aim = min(self.target + MARGIN, 0.5 * (1.0 + self.target))
+
+        def solved(logs: NDArray[np.float64]) -> Point | None:
+            before = len(self.points)
+            point = self.point(logs)
+            if len(self.points) > before:
+                watch(self.points[-1])
+            return point
+
+        def cost(logs: NDArray[np.float64]) -> float:
+            point = solved(logs)
+            return self.cost(point) if point else 1e3
+
+        def lacking(logs: NDArray[np.float64]) -> NDArray[np.float64]:
+            """Titration above the aim, by inlet."""
+            point = solved(logs)
+            if point is None:
+                return np.full(len(self.points[0].exits), -1.0)
+            return np.array(list(point.exits.values())) - aim
+
+        start = np.log([d.start for d in self.doses])
+        if solved(start) is None:
+            raise ConvergenceError(
+                "optimise: the steady state at the first doses was not found; try another mesh"
+            )
+        minimize(
+            cost,
+            start,
+            method="COBYQA",
+            bounds=[(np.log(d.lowest), np.log(d.highest)) for d in self.doses],
+            constraints={"type": "ineq", "fun": lacking},
+            options={"maxfev": limit, "initial_tr_radius": STEP, "final_tr_radius": CLOSE},
+        )
 
 
 def optimise(
@@ -207,70 +269,40 @@ def optimise(
     when no dose within bounds reaches the target.
     """
     search = Search(case, checked_doses(case, target, weight, velocities, limit), target, weight)
+    search.run(limit, watch)
+    return search.found(), search.best_case(), search
 
-    def solved(logs: NDArray[np.float64]) -> Point | None:
-        before = len(search.points)
-        point = search.point(logs)
-        if len(search.points) > before:
-            watch(search.points[-1])
-        return point
 
-    aim = min(target + MARGIN, 0.5 * (1.0 + target))
-
-    def cost(logs: NDArray[np.float64]) -> float:
-        point = solved(logs)
-        return search.cost(point) if point else 1e3
-
-    def lacking(logs: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Titration above the aim, by inlet."""
-        point = solved(logs)
-        return (
-            np.array(list(point.exits.values())) - aim
-            if point
-            else np.full(len(search.points[0].exits), -1.0)
-        )
-
-    start = np.log([d.start for d in search.doses])
-    if solved(start) is None:
-        raise ConvergenceError(
-            "optimise: the steady state at the first doses was not found; try another mesh"
-        )
-    minimize(
-        cost,
-        start,
-        method="COBYQA",
-        bounds=[(np.log(d.lowest), np.log(d.highest)) for d in search.doses],
-        constraints={"type": "ineq", "fun": lacking},
-        options={"maxfev": limit, "initial_tr_radius": STEP, "final_tr_radius": CLOSE},
-    )
-    best = search.best()
-    if best is None:
-        nearest = max(search.points, key=lambda p: min(p.exits.values()))
-        raise ConvergenceError(
-            f"optimise: none of {len(search.points)} steady states reaches {target:g} at every exit; the nearest has "
-            + ", ".join(f"{name} {value:.4f}" for name, value in nearest.exits.items())
-        )
-    return best, search.case_at(best.doses).with_({"fidelity": case.fidelity}), search
+def states(number: int) -> str:
+    """A number of steady states in words."""
+    return f"{number} steady state{'' if number == 1 else 's'}"
 
 
 def make_directory(directory: Path) -> None:
-    """Make the directory of the results, before the search that would be lost; InputError when nothing can be written there."""
+    """Make the directory of the results, before the search that would be lost; InputError when nothing can be written there, or when
+    something else than an earlier search is there."""
     try:
+        if directory.is_dir() and any(directory.iterdir()) and kind_of_directory(directory) is not SEARCH:
+            raise InputError.at(
+                directory, "", what_it_is(directory), "a new directory, or that of an earlier search (-o DIR)"
+            )
         directory.mkdir(parents=True, exist_ok=True)
+        for name in ("case.toml", "points.csv"):  # of an earlier search, whose doses this one may not reach
+            (directory / name).unlink(missing_ok=True)
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as error:
         raise InputError(f"{directory}: cannot be used as output directory ({error.strerror})") from None
 
 
-def write_search(directory: Path, best: Case, search: Search) -> None:
-    """`case.toml`, the case with the best doses, and `points.csv`, every steady state [SI]."""
-    write_atomically(directory / "case.toml", best.to_toml())
+def write_points(directory: Path, search: Search) -> None:
+    """`points.csv`: every steady state [SI]."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     first = search.points[0]
-    table.writerow(
-        [*first.doses, *(f"titration.{n}.exit_mean" for n in first.exits), "fed", "cvd.total", "cost"]
-    )
+    names = [f"titration.{n}.exit_mean" for n in first.exits]
+    names += [f"{kind}.{n}" for kind in ("dose_ratio", "excess_number") for n in first.ratios]
+    table.writerow([*first.doses, *names, "fed", "cvd.total", "cost"])
     for p in search.points:
-        table.writerow([*p.doses.values(), *p.exits.values(), p.fed, p.cvd, search.cost(p)])
+        numbers = (p.doses, p.exits, p.ratios, p.excess)
+        table.writerow([*(v for group in numbers for v in group.values()), p.fed, p.cvd, search.cost(p)])
     write_atomically(directory / "points.csv", text.getvalue())

@@ -16,7 +16,7 @@ WITHOUT_NUMBERS = (
     *("results.py", "pictures.py", "maps.py", "outline.py", "curves.py", "labels.py", "fieldnames.py"),
     *("drawing.py", "beside.py", "movie.py"),
     *("streamlines.py", "optimise.py", "revision.py"),
-    *("watch.py", "kinds.py", "rundirs.py"),
+    *("watch.py", "kinds.py", "rundirs.py", "searchscreen.py"),
     *("paraview.py", "notebook.py"),
 )
 """Parts of the package that change no number of a run: sweeps, particles, the command line, warnings, pictures."""

@@ -32,6 +32,14 @@ def test_leanest_dose_is_the_mass_balance() -> None:
     assert len(search.points) <= 30
 
 
+def cheapest(rows: list[dict[str, str]], target: float) -> float:
+    """The least cost of the points that reach the target at both exits."""
+    exits = [min(float(row[f"titration.{name}.exit_mean"]) for name in ("tma", "water")) for row in rows]
+    return min(
+        float(row["cost"]) for row, reached in zip(rows, exits, strict=True) if reached >= target - 1e-4
+    )
+
+
 @pytest.mark.slow
 def test_both_zones_through_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Fails when the doses written do not titrate both zones, cost more than the saturating ones by a tenth, or cannot be run again."""
@@ -50,7 +58,19 @@ def test_both_zones_through_the_command_line(tmp_path: Path, capsys: pytest.Capt
     assert {"titration.tma.exit_mean", "titration.water.exit_mean", "fed", "cvd.total", "cost"} <= set(
         rows[0]
     )
-    assert "Best:" in capsys.readouterr().out
+    assert {"dose_ratio.tma", "dose_ratio.water", "excess_number.tma", "excess_number.water"} <= set(rows[0])
+    assert (tmp_path / "plots" / "search.png").stat().st_size > 10_000
+    out = capsys.readouterr().out
+    told = " ".join(out.split())
+    assert (
+        f"Found in {len(rows)} steady states: the target coverage of 0.95 is reached at every exit with"
+        in told
+    )
+    last = rows[[f"{float(row['cost']):.6g}" for row in rows].index(f"{cheapest(rows, 0.95):.6g}")]
+    for inlet in ("tma", "water"):
+        ratio, excess = float(last[f"dose_ratio.{inlet}"]), float(last[f"excess_number.{inlet}"])
+        assert f"dose ratio {ratio:.4g} ({excess:.4g} molecules per site)" in told
+    assert f"mpm run {tmp_path}/case.toml" in told and "umol/m/s" in told
 
 
 def test_velocities_are_doses_too() -> None:
@@ -126,3 +146,35 @@ def test_a_directory_that_cannot_be_written_is_refused_before_the_search(tmp_pat
     assert main(["optimise", "single_zone", "-o", str(tmp_path / "file" / "below")]) == 2
     assert main(["optimise", "single_zone", "-o", str(tmp_path / "new"), "--limit", "0"]) == 2
     assert not (tmp_path / "new").exists()
+
+
+def test_what_was_seen_is_kept_when_the_target_is_not_reached(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when a search that does not reach its target ends without saying so, with the doses of an earlier one, or with nothing to
+    look at; or when it is begun without the warnings of check."""
+    settings = [part for key, value in TINY.items() for part in ("--set", f"{key}={json.dumps(value)}")]
+    crowded = [
+        "--set",
+        "material.glass_beads.site_density='1.4e-5 mol/m^2'",
+        "--set",
+        "gas.pressure='1 torr'",
+    ]
+    (tmp_path / "points.csv").write_text("of an earlier search\n")
+    (tmp_path / "case.toml").write_text("of an earlier search\n")
+    arguments = ["optimise", "single_zone", "-o", str(tmp_path), "--limit", "1", "--target", "1"]
+    assert main([*arguments, *settings, *crowded]) == 3
+    out, err = capsys.readouterr()
+    assert "the target is not reached: none of " in err and "try a lower --target" in err
+    assert len(err.splitlines()) == 1
+    assert "warning: " in out and "too lean" in out and "Found" not in out
+    assert not (tmp_path / "case.toml").exists()
+    assert len((tmp_path / "points.csv").read_text().splitlines()) >= 2
+    assert (tmp_path / "plots" / "search.png").exists()
+
+
+def test_a_search_does_not_replace_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when the doses of a search take the place of the case of a run."""
+    (tmp_path / "case.toml").write_text(zone(mesh=TINY).to_toml())
+    assert main(["optimise", "single_zone", "-o", str(tmp_path)]) == 2
+    assert "the directory of a run" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import typer
 
 from mpm.cli.base import CaseArgument, SetOption, app
 from mpm.launcher import rank
+from mpm.screen import screen
 from mpm.settings import parse_settings
 
 
@@ -43,11 +44,13 @@ def sweep(
 def optimise(
     case: CaseArgument,
     target: Annotated[
-        float, typer.Option(help="wanted mean coverage at the exit of every dosed zone")
+        float, typer.Option(metavar="SHARE", help="wanted mean coverage at the exit of every dosed zone")
     ] = 0.99,
-    weight: Annotated[float, typer.Option(help="moles of precursor that a mole of CVD is worth")] = 10.0,
+    weight: Annotated[
+        float, typer.Option(metavar="MOLES", help="moles of precursor that a mole of parasitic CVD is worth")
+    ] = 10.0,
     velocities: Annotated[bool, typer.Option("--velocities", help="choose port velocities too")] = False,
-    limit: Annotated[int, typer.Option(help="steady states at most")] = 80,
+    limit: Annotated[int, typer.Option(metavar="N", help="steady states at most")] = 80,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/optimise/CASE")
     ] = None,
@@ -57,32 +60,37 @@ def optimise(
 
     mpm optimise single_cycle
     mpm optimise single_cycle --target 0.95 --velocities -o results/lean
+
+    The start are the mass fractions that would be just enough if nothing were lost; every further step is a steady state. DIR gets the
+    case with the best doses (case.toml), all steady states (points.csv) and a picture of the search (plots/search.png).
     """
     from mpm.case import load_case
 
     loaded = load_case(case, parse_settings(settings))
     directory = output or Path("results") / "optimise" / Path(case).stem
 
-    from mpi4py import MPI
-
-    from mpm import optimise as search
+    from mpm.optimise import Search, checked_doses, make_directory, write_points
     from mpm.parallel import on_root
 
-    search.checked_doses(loaded, target, weight, velocities, limit)  # bad input leaves nothing behind
-    on_root(MPI.COMM_WORLD, lambda: search.make_directory(directory))
+    from mpi4py import MPI  # isort: skip  (after mpm.optimise, which loads the finite-element stack)
 
-    def say(point: search.Point) -> None:
-        exits = ", ".join(f"{name} {value:.4f}" for name, value in point.exits.items())
-        doses = ", ".join(
-            f"{key.removeprefix('geometry.inlet.')} = {v:.4g}" for key, v in point.doses.items()
-        )
-        print(f"{doses}: exits {exits}; CVD {point.cvd:.3g} mol/m/s", flush=True)
+    doses = checked_doses(loaded, target, weight, velocities, limit)  # bad input leaves nothing behind
+    on_root(MPI.COMM_WORLD, lambda: make_directory(directory))
+    search, console = Search(loaded, doses, target, weight), screen()
+    if rank() != 0:
+        search.run(limit)
+        search.found()
+        return
+    from mpm.searchscreen import draw_search, print_found, print_point, print_task
 
-    best, best_case, points = search.optimise(
-        loaded, target, weight, velocities, limit, say if rank() == 0 else lambda point: None
-    )
-    if rank() == 0:
-        search.write_search(directory, best_case, points)
-        print("Best:")
-        say(best)
-        print(f"Results: {directory}")
+    print_task(search, limit, console)
+    try:
+        search.run(limit, lambda point: print_point(search, point, console))
+    finally:  # a search that is stopped, or finds nothing, leaves what it has seen
+        if search.points:
+            write_points(directory, search)
+            draw_search(directory, search)
+    from mpm.files import write_atomically
+
+    write_atomically(directory / "case.toml", search.best_case().to_toml())
+    print_found(search, directory, console)

@@ -17,6 +17,7 @@ from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any
 
+from mpm.checks import check_case
 from mpm.errors import InputError
 from mpm.files import lock, write_atomically
 from mpm.sweep.board import Board, now, say
@@ -24,7 +25,7 @@ from mpm.sweep.cluster import Pool, PoolLost, open_pool
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.lease import Lease
 from mpm.sweep.pictures import draw
-from mpm.sweep.plan import plan
+from mpm.sweep.plan import Point, plan
 from mpm.sweep.point import GRACE, Task, finished, mpirun, program, run_point
 from mpm.sweep.results import Results
 from mpm.sweep.sweepfile import read_sweep
@@ -82,8 +83,16 @@ def run_sweep(
         results = Results(sweep, points, layout)
         for sentence in changes(results, earlier):
             say(sentence)
+        for sentence in warnings_of(points):
+            say(sentence)
         opening = open_pool(scheduler, jobs, ranks, sweep.slurm, layout.driver)
         return _drive(results, opening, ranks, command, sys.stderr.isatty() if live is None else live)
+
+
+def warnings_of(points: Sequence[Point]) -> list[str]:
+    """What `mpm check` warns of at the first point that has a case: the others have most of it in common."""
+    case = next(point.case for point in points if point.case is not None)
+    return [f"warning, at the first point: {sentence}" for sentence in check_case(case)["warnings"]]
 
 
 @contextlib.contextmanager
