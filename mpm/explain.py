@@ -69,7 +69,10 @@ def _key(key: Key) -> Iterator[Line]:
         ("names" if key.free else "one of", ", ".join(key.choices)),
         ("SI unit", key.unit),
         ("default", _plain(key.default_text)),
-        ("in a file", f"{_header(key)}{key.last} = {key.example}" if key.example else ""),
+        (
+            "in a file",
+            f"{key.last} = {key.example}{_place(key)}" if key.example and key.last[0] != "<" else "",
+        ),
         ("in a shell", _setting(key)),
         ("read by", f"fidelity {key.read_by}"),
         ("see also", ", ".join(key.related)),
@@ -78,17 +81,12 @@ def _key(key: Key) -> Iterator[Line]:
             yield 2, f"{label:<{_LABEL}}{text}", _LABEL
 
 
-def _header(key: Key) -> str:
+def _place(key: Key) -> str:
     """The table that a key stands in, as a file opens it."""
     table = key.table.removesuffix(".<name>")
-    if not table or table in _NAMES.keys() & {
-        "geometry.layer",
-        "geometry.inlet",
-        "geometry.outlet",
-        "geometry.zone",
-    }:
-        return f"[[{table}]] " if table else ""
-    return f"[{table}.{_NAMES[table]}] " if table in _NAMES else f"[{table}] "
+    if table not in _NAMES:
+        return f" in [{table}]" if table else ""
+    return f" in a [[{table}]]" if table.startswith("geometry.") else f" in [{table}.{_NAMES[table]}]"
 
 
 def _setting(key: Key) -> str:

@@ -36,8 +36,15 @@ def _where_typed(key: str, value: Any) -> Any:
     """A path typed in a shell is relative to where the user stands; a name stays one, unless there is a file of it."""
     if key not in PATHS or not isinstance(value, str):
         return value
+    looks_like_a_name = not Path(value).suffix and len(Path(value).parts) == 1
+    found = file_in(Path.cwd(), key, value)
+    return found if found != value or looks_like_a_name else str(Path.cwd() / value)
+
+
+def file_in(folder: Path, key: str, value: Any) -> Any:
+    """The file that a value names in `folder`, where it is one of a key that may be a path; else the value as it is."""
+    if key not in PATHS or not isinstance(value, str):
+        return value
     from mpm.files import is_file
 
-    here = Path.cwd() / value
-    looks_like_a_name = not Path(value).suffix and len(Path(value).parts) == 1
-    return value if looks_like_a_name and not is_file(here) else str(here)
+    return str(folder / value) if is_file(folder / value) else value

@@ -9,6 +9,7 @@ from typing import Any
 
 from mpm.case import Case
 from mpm.errors import InputError
+from mpm.settings import file_in
 from mpm.sweep.quantities import to_number
 from mpm.sweep.sweepfile import MOST_POINTS, Axis, Sweep
 
@@ -73,7 +74,12 @@ def plan(sweep: Sweep) -> list[Point]:
     """
     points = []
     for levels in combinations(sweep):
-        overrides = {key: level for axis, level in zip(sweep.axes, levels, strict=True) for key in axis.keys}
+        folder = sweep.path.resolve().parent
+        overrides = {
+            key: file_in(folder, key, level)
+            for axis, level in zip(sweep.axes, levels, strict=True)
+            for key in axis.keys
+        }
         numbers = tuple(to_number(level)[0] for level in levels)
         try:
             case = sweep.base.with_(overrides)

@@ -12,7 +12,7 @@
     key = "geometry.inlet.tma.width"      # or a list of keys that get the same value
     name = "width"                        # optional: the axis's name in tables (default: the key)
     values = ["2.2 mm", "4 mm"]           # or linspace / logspace = { start, stop, num }
-    [sweep.set]                           # fixed overrides
+    [sweep.set]                           # fixed overrides; files (motion.profile) beside this one, else beside the case
     "time.end" = "10 s"
     [sweep.slurm]                         # for --scheduler slurm, see mpm.sweep.cluster
 
@@ -28,6 +28,7 @@ from mpm.case import Case, load_case
 from mpm.errors import InputError
 from mpm.files import is_file
 from mpm.kinds import SWEEP, parse_input, read_input_text
+from mpm.settings import file_in
 from mpm.sweep.conditions import Condition
 from mpm.sweep.quantities import Range, to_number, unit_as_written
 from mpm.units import LARGEST, describe
@@ -214,7 +215,7 @@ def _base(path: Path, name: str, fixed: Mapping[str, Any]) -> Case:
     beside = path.parent / name
     source: str | Path = beside if is_file(beside) or name.endswith(".toml") else name
     try:
-        return load_case(source, fixed)
+        return load_case(source, {key: file_in(path.resolve().parent, key, v) for key, v in fixed.items()})
     except InputError as error:
         if fixed:
             raise InputError(f"{path}: sweep.case with sweep.set: {error}") from None

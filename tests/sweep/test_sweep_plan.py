@@ -87,6 +87,19 @@ def test_an_axis_without_effect_is_refused(tmp_path):
         plan(read_sweep(sweep_file(tmp_path, body + fixed)))
 
 
+def test_files_are_found_beside_the_sweep(tmp_path):
+    """Fails when a profile that the sweep file names, fixed or as levels, is looked for beside the case that it varies."""
+    for name, speed in (("a.csv", 0.01), ("b.csv", 0.02)):
+        rows = "".join(f"{phase},{speed},0,1\n" for phase in range(0, 360, 30))
+        (tmp_path / name).write_text(f"phase_deg,u_x_m/s,u_y_m/s,contact\n{rows}")
+    levels = axis("motion.profile", 'values = ["a.csv", "b.csv", "thesis"]', 'name = "how"')
+    points = plan(read_sweep(sweep_file(tmp_path, levels)))
+    assert [point.case.motion.mean_velocity for point in points] == pytest.approx([0.01, 0.02, 0.013])
+    assert points[0].levels == ("a.csv",)
+    fixed = axis("motion.gamma", "values = [0.3]") + '[sweep.set]\n"motion.profile" = "b.csv"\n'
+    assert plan(read_sweep(sweep_file(tmp_path, fixed)))[0].case.motion.mean_velocity == pytest.approx(0.02)
+
+
 def test_unquoted_fixed_overrides_are_the_same_as_quoted_ones(tmp_path):
     """Fails when TOML's nested reading of `time.end = ...` is not taken for the dotted key."""
     body = axis("motion.gamma", "values = [0.3]")
