@@ -120,17 +120,18 @@ SCREENS: dict[str, list[str]] = {
     "report": ["report", "run"],
     "report of two": ["report", "run", "run2"],
     "paraview": ["paraview", "run"],
+    "optimise": ["optimise", "single_zone", "-o", "best", "--target", "0.5", "--limit", "12", "--set", "geometry.cell_width=9 mm"],
     "sweep": ["sweep", "sweep.toml", "-o", "sweep"],
     "--version": ["--version"],
 }  # fmt: skip
 """Calls whose screens are for people; those that compute do so on the tiny mesh."""
 PROSE = {"list", "explain", "explain, a table", "explain, a key", "explain, a number"}
 """Those that explain: definitions such as `0: closed`, and titles that people have given."""
-LINES = {"plot", "report", "report of two", "sweep"}
+LINES = {"plot", "report", "report of two", "optimise", "sweep"}
 """Those that print paths and progress alone, which have no layout."""
-for _name in ("run", "run, steady"):
+for _name in ("run", "run, steady", "optimise"):
     for _key, _value in {**SHORT, **TINY}.items():
-        if _key != "geometry.cell_width":
+        if _key.startswith("geometry.layer") or (_name != "optimise" and _key != "geometry.cell_width"):
             SCREENS[_name] += ["--set", f"{_key}={_value}"]
 
 
@@ -151,16 +152,16 @@ CUT = re.compile("\u2026|[^\\].A-Z ]\\.\\.\\.$", re.MULTILINE)
 BOXES = str.maketrans(dict.fromkeys("│┃┆|┏┓┗┛┡┩┳╇┴└┘┌┐├┤─━┬┼:,;()[]'\"#", " "))
 NUMBER = r"(?<![\w.^/)-])-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.^/(]|\+\d)"
 UNIT = (
-    r"(?:(?:Pa s|[mcunk]?m|[mu]?s|min|h|%|K|Pa|Hz|deg|degC|GB|kJ/mol|g/mol|1/m|sccm/m|mol/m|umol/m|steps/s|square angstrom)(?![\w])"
+    r"(?:(?:Pa s|mol|[mcunk]?m|[mu]?s|min|h|%|K|Pa|Hz|deg|degC|GB|kJ/mol|g/mol|1/m|sccm/m|mol/m|umol/m|steps/s|square angstrom)(?![\w])"
     r"|(?:cm|mm|um|nm|m|kg|Pa|[mu]?mol|J|W|sites per|per)[ /^][\w/^ ]*)"
 )
 RATIOS = re.compile(
     r"\b(?:porosity|tortuosity[ _]factor|sphericity|fractions?|mass_fractions\.\w+|Knudsen|Reynolds|Re|Peclet|Damkoehler|Courant|Kn|over|"
-    r"share|coverage|times|molecules|molecule|error|error of|particles of|balances|gamma|drawn back in|continuum|grading|viscosity_ratio|"
-    r"initial_coverage\.\S+|dilute|b)\b"
+    r"share|coverage|ratio|times|molecules|molecule|error|error of|particles of|balances|gamma|drawn back in|continuum|grading|"
+    r"viscosity_ratio|initial_coverage\.\S+|dilute|b)\b"
 )
 COUNTS = re.compile(
-    r"\b(?:cells|columns|rows|facets|steps?|processes|points|phases|steps_per_cycle|ports|done|running|to run|at a time)\b"
+    r"\b(?:cells|columns|rows|facets|steps?|processes|points|phases|steps_per_cycle|ports|done|running|to run|at a time|states)\b"
 )
 
 
@@ -174,7 +175,8 @@ def bare_numbers(text: str) -> list[str]:
             or set(line) <= set("0123456789 ")
         ):
             continue  # equations, commands, the numbers of ports in a sketch
-        label = re.split(r"\S(?::|  )", line.strip(), maxsplit=1)[0]
+        line = re.sub(r"^\d+: ", "", line)  # an enumeration
+        label = re.split(r"(?<=\S)(?::|  )", line.strip(), maxsplit=1)[0]
         for clause in re.split(r"[,;:] | \(|\)(?=$|[ ,;:])|  +# ", line):
             after = [clause[match.end() :] for match in re.finditer(NUMBER, clause)]
             bare = [rest for rest in after if not re.match(rf"(?: (?:to|and|/|->) {NUMBER})*\s+{UNIT}", rest)]
