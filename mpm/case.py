@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -19,49 +18,30 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import (
     Field,
     PrivateAttr,
-    SerializerFunctionWrapHandler,
     Strict,
     ValidationError,
-    WithJsonSchema,
-    model_serializer,
     model_validator,
 )
 
 from mpm.caseio import assemble, write_toml
 from mpm.chemistry import Mechanism
-from mpm.constants import GRAVITY
-from mpm.diffusion import scaled_diffusivity
 from mpm.files import read_text
-from mpm.gases import CARRIERS, ideal_gas_density, symbol
+from mpm.gastable import Gas
 from mpm.kinds import CASE, read_input
 from mpm.layout import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.materials import Material
 from mpm.mechanism import Chemistry, build_mechanism, check_rates
 from mpm.messages import to_input_error
+from mpm.motiontable import Motion
 from mpm.names import case_file
-from mpm.profile import PRESETS, BedProfile, read_profile
+from mpm.profile import PRESETS
 from mpm.schema import DRAFT, finished
 from mpm.units import (
-    DIFFUSIVITY,
-    Angle,
-    BedSpeed,
-    Diffusivity,
     Duration,
-    Frequency,
-    GasDensity,
-    Instant,
     Interval,
-    MolarMass,
-    NonNegative,
-    Pressure,
     RunTime,
-    Temperature,
-    Velocity,
-    Viscosity,
     WallTime,
-    in_range,
     reject,
-    worked_out,
 )
 
 __all__ = [
@@ -80,189 +60,6 @@ __all__ = [
     "case_schema",
     "load_case",
 ]
-
-
-SAME_FREQUENCY = 0.01
-"""Relative difference up to which a profile belongs to a vibration: a DEM's waveform may be fitted to a record of the same machine."""
-
-_ONE_DIFFUSIVITY = {"type": "string", **DIFFUSIVITY.about}
-SpeciesDiffusivity = Annotated[
-    dict[str, Diffusivity],
-    WithJsonSchema(
-        {
-            "anyOf": [_ONE_DIFFUSIVITY, {"type": "object", "additionalProperties": _ONE_DIFFUSIVITY}],
-            "accepted": f"{DIFFUSIVITY.accepted}, or a table of them by species",
-            "examples": ["2.88e-5 m^2/s"],
-        }
-    ),
-]
-
-
-class Gas(Frozen):
-    """The carrier gas, whose density and viscosity are those of the mixture (precursors are dilute)."""
-
-    carrier: Annotated[str, Field(json_schema_extra={"presets": [*CARRIERS]})] = "N2"
-    """the gas that all inlets blow: N2, Ar, He, or any other name with its molar_mass and viscosity"""
-    temperature: Temperature = 473.0
-    """temperature of gas and solids, everywhere the same"""
-    pressure: Pressure = 101325.0
-    """ambient pressure, at the outlets"""
-    molar_mass: MolarMass = worked_out("that of the carrier")
-    """molar mass of the carrier gas"""
-    viscosity: Viscosity = worked_out("the carrier's at this temperature (Sutherland)")
-    """dynamic viscosity of the gas"""
-    density: GasDensity = worked_out("ideal gas law")
-    """density of the gas"""
-    diffusivity: SpeciesDiffusivity = worked_out(
-        "2.88e-5 m^2/s (N2, 473 K, 101325 Pa), scaled to the carrier, temperature and pressure", {}
-    )
-    """of each species in the free gas: one value for all, e.g. "2.88e-5 m^2/s", or a table of them (and of a default)"""
-    _scaled: tuple[str, ...] = PrivateAttr(())
-
-    @property
-    def scaled(self) -> tuple[str, ...]:
-        """The species whose diffusivity the case leaves to `mpm.diffusion`."""
-        return self._scaled
-
-    def complete(self, mechanism: Mechanism) -> None:
-        """Fill in the diffusivities that are left out; the case does this once the mechanism is known."""
-        left_out = [species for species in mechanism.species if species.name not in self.diffusivity]
-        self._scaled = tuple(species.name for species in left_out)
-        default = {
-            species.name: scaled_diffusivity(
-                species, self.carrier, self.molar_mass, self.temperature, self.pressure
-            )
-            for species in left_out
-        }
-        for name, value in default.items():
-            in_range(f"gas.diffusivity.{name}", value, "m^2/s")
-        values = {**default, **self.diffusivity}
-        self.__dict__["diffusivity"] = {name: values[name] for name in mechanism.species_names}
-
-    @model_validator(mode="after")
-    def _fill_in(self) -> Self:
-        model, values, given = CARRIERS.get(self.carrier), self.__dict__, self.model_fields_set
-        if model is None and not {"molar_mass", "viscosity"} <= given:
-            raise reject(
-                repr(self.carrier),
-                f"one of {', '.join(CARRIERS)}, or any name with molar_mass and viscosity",
-                key="carrier",
-                given=symbol(self.carrier),
-                known=list(CARRIERS),
-            )
-        if "molar_mass" not in given and model is not None:
-            values["molar_mass"] = model.molar_mass
-        if "viscosity" not in given and model is not None:
-            values["viscosity"] = in_range("viscosity", model.viscosity(self.temperature), "Pa s")
-        if "density" not in given:
-            density = ideal_gas_density(self.pressure, self.molar_mass, self.temperature)
-            values["density"] = in_range("density", density, "kg/m^3")
-        return self
-
-
-class Motion(Frozen):
-    """Vibration of the reactor and conveying of the bed."""
-
-    gamma: NonNegative = 0.30
-    """largest vertical acceleration of the reactor over g; 0: no vibration, the bed moves steadily at bed_velocity"""
-    frequency: Frequency = 16.0
-    """frequency of the vibration"""
-    angle: Angle = math.pi / 3.0
-    """direction of the vibration, counted from angle_from; it must have a vertical component"""
-    angle_from: Literal["horizontal", "vertical"] = "horizontal"
-    """what the angle is counted from"""
-    bed_velocity: BedSpeed = 0.013
-    """mean speed at which the bed is conveyed, relative to the reactor, to the right; 0: it stays. A profile file brings its own"""
-    profile: Annotated[str, Field(json_schema_extra={"presets": [*PRESETS]})] = "thesis"
-    """how the bed moves within a cycle: thesis (lift-off at liftoff_velocity), phases (liftoff_phase and contact_phase), or the path
-    of a CSV file from `mpm dem`"""
-    liftoff_velocity: Velocity = -0.004
-    """vertical velocity of the reactor at which the bed lifts off (profile thesis)"""
-    liftoff_phase: Angle | None = None
-    """phase of the cycle at which the bed lifts off, 0 deg to below 360 deg (profile phases)"""
-    contact_phase: Angle | None = None
-    """phase of the cycle at which the bed lands again, 0 deg to below 360 deg (profile phases)"""
-    inlet_frame: Literal["reactor", "lab"] = "reactor"
-    """what the inlets are fixed to: they ride on the reactor, or stand still in the laboratory while it moves over them"""
-    start: Instant = 0.05
-    """when vibration and conveying start"""
-    startup: Literal["developed", "impulsive"] = "developed"
-    """how a resolved run begins to vibrate: in the periodic state of the gas, or from rest with the true transient"""
-
-    _table: BedProfile | None = PrivateAttr(None)
-
-    @property
-    def table(self) -> BedProfile | None:
-        """The profile file's content; None without vibration or with a profile of phases."""
-        return self._table
-
-    @property
-    def mean_velocity(self) -> float:
-        """Cycle mean of the bed's velocity in the reactor's frame [m/s], negative to the left: the profile file's, else `bed_velocity`."""
-        return self.bed_velocity if self._table is None else self._table.mean
-
-    @property
-    def peak_vertical_velocity(self) -> float:
-        """Amplitude of the reactor's vertical velocity, Gamma g / w [m/s]."""
-        return self.gamma * GRAVITY / (2.0 * math.pi * self.frequency)
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        low, high = (0.0, math.pi / 2.0)
-        steep = self.angle <= low if self.angle_from == "horizontal" else self.angle >= high
-        if not low <= self.angle <= high or steep:
-            raise reject(
-                f"{math.degrees(self.angle):g} deg from the {self.angle_from}",
-                "an angle from 0 deg to 90 deg that leaves a vertical component",
-                key="angle",
-            )
-        if self.profile not in PRESETS:
-            self._read_table()
-        elif self.gamma == 0.0:
-            pass  # nothing hops: a preset has no phases to check
-        elif self.profile == "thesis":
-            peak = self.peak_vertical_velocity
-            if not -peak < self.liftoff_velocity < 0.0:
-                raise reject(
-                    f"{self.liftoff_velocity:g} m/s",
-                    f"between 0 m/s and the reactor's peak velocity, {-peak:.4g} m/s",
-                    key="liftoff_velocity",
-                )
-        else:
-            for key in ("liftoff_phase", "contact_phase"):
-                value = getattr(self, key)
-                if value is None or not 0.0 <= value < 2.0 * math.pi:
-                    raise reject(
-                        "nothing" if value is None else f"{math.degrees(value):g} deg",
-                        'an angle from 0 deg to below 360 deg, e.g. "97.85 deg", for profile = "phases"',
-                        key=key,
-                    )
-            if self.liftoff_phase == self.contact_phase:
-                raise reject("the phase of lift-off", "another phase", key="contact_phase")
-        return self
-
-    def _read_table(self) -> None:
-        """Read the profile file; it must be one even where nothing vibrates, and of this frequency where something does."""
-        table = read_profile(Path(self.profile), "profile")
-        if self.gamma == 0.0:
-            return
-        made = table.conditions
-        if made is not None and abs(made.frequency - self.frequency) > SAME_FREQUENCY * self.frequency:
-            raise reject(
-                f"{self.profile}: a profile made at {made.frequency:.6g} Hz for a vibration at {self.frequency:.6g} Hz, in whose cycle its "
-                "bed would hop to another beat",
-                f'a profile made at {self.frequency:.6g} Hz, or frequency = "{made.frequency:.6g} Hz"',
-                key="profile",
-            )
-        self._table = table
-
-    @model_serializer(mode="wrap")
-    def _write_what_rules(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `bed_velocity` where a profile file says how fast the bed moves."""
-        table: dict[str, Any] = handler(self)
-        if self._table is not None:
-            table.pop("bed_velocity", None)
-        return table
 
 
 class Time(Frozen):

@@ -18,6 +18,8 @@ from typing import Annotated, Any
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from mpm.spelling import advice
+
 _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf|nan)(?![A-Za-z0-9_.])\s*(.*?)\s*$"
 )
@@ -31,28 +33,6 @@ _LOOK_ALIKES = {
     "deg": re.compile("[\u00ba\u02da\u2218]"),
 }
 """Characters that keyboards and word processors put in place of the right ones, by what is meant."""
-_ADVICE = (
-    (re.compile(r"C"), 'C is the coulomb, degrees Celsius are "degC"'),
-    (re.compile(r"deg(rees?)?\.? ?C"), 'degrees Celsius are "degC"'),
-    (re.compile(r"k"), 'kelvins are "K"'),
-    (re.compile(r"A"), 'A is the ampere, the angstrom is "angstrom"'),
-    (re.compile(r"u|amu|Da"), 'molar masses are "g/mol"'),
-    (re.compile(r"eV"), 'energies are those of a mole, "kJ/mol"; 1 eV is "96.485 kJ/mol"'),
-    (
-        re.compile(r"(sites?|1)/nm\^?2|nm\^?-2"),
-        'sites are counted in moles; 1 per nm^2 is "1.6605e-6 mol/m^2"',
-    ),
-    (re.compile(r"/.*"), 'one over a unit is written "1/m"'),
-    (re.compile(r"Pas"), 'a product is written "Pa s"'),
-    (re.compile(r"F"), 'F is the farad, degrees Fahrenheit are "degF"'),
-    (
-        re.compile(r"sccm|sccs|slm|slpm|sLm|NL/min|Nl/min|(l|ml|cc|cm\^?3)/(min|s)", re.IGNORECASE),
-        'a flow; a port has the velocity flow/(width depth), e.g. "3.5 cm/s", at the temperature and pressure of the reactor',
-    ),
-    (re.compile(r",\d.*"), "the decimal sign is a point"),
-)
-"""What is often written, and what to write."""
-_POWER = re.compile(r"([A-Za-z\u00b5\u03bc])(-?\d)")
 SMALLEST, LARGEST = 1e-30, 1e30
 """Magnitudes of quantities in SI units. What lies outside is a slip, and would overflow or vanish in the products of the model."""
 _ANGLES = {"radian", "degree", "turn", "arcminute", "arcsecond", "revolutions_per_minute", "grade"}
@@ -98,29 +78,14 @@ def parse(text: str, unit: str) -> float:
     try:
         given = registry.Unit(symbol)
     except Exception as error:  # pint raises many types here, down to tokenizer errors
-        raise ValueError(f"unknown unit {symbol!r}{_advice(written, wanted)}") from error
+        raise ValueError(f"unknown unit {symbol!r}{advice(written, wanted, registry)}") from error
     if given.dimensionality != wanted.dimensionality or _counts_angle(given) != _counts_angle(wanted):
-        raise ValueError(f"{_dimension_text(given)}{_advice(written, wanted)}")
+        raise ValueError(f"{_dimension_text(given)}{advice(written, wanted, registry)}")
     if "inf" in number or "nan" in number:
         return float(number)
     if given == registry.degree:
         return math.radians(float(number))  # the float next to the true value; decimals of pi would miss it
     return float(registry.Quantity(Decimal(number), given).to(wanted).magnitude)
-
-
-def _advice(symbol: str, wanted: Any) -> str:
-    """What to write instead of a unit that people use and that cannot be read, or means something else here."""
-    known = next((advice for pattern, advice in _ADVICE if pattern.fullmatch(symbol)), None)
-    if known is not None:
-        return f"; {known}"
-    powers = _POWER.sub(r"\1^\2", symbol)
-    if powers != symbol:
-        return f"; powers are written {powers}"
-    try:
-        small = _registry().parse_units(symbol, case_sensitive=False)
-    except Exception:  # of many types, as above
-        return ""
-    return f'; did you mean "{small:~C}"?' if small.dimensionality == wanted.dimensionality else ""
 
 
 def _counts_angle(unit: Any) -> bool:
