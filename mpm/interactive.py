@@ -50,7 +50,8 @@ class Check(Mapping[str, Any]):
 
         terminal, page = screen(), io.StringIO()
         width = terminal.width if terminal.is_terminal else PAGE
-        console = Console(file=page, width=width, markup=False, emoji=False, highlight=False)
+        plain: dict[str, Any] = {"force_terminal": False, "force_jupyter": False, "color_system": None}
+        console = Console(file=page, width=width, markup=False, emoji=False, highlight=False, **plain)
         print_report(self.case, self.numbers, console)
         return page.getvalue().rstrip()
 
@@ -62,8 +63,8 @@ class Check(Mapping[str, Any]):
         parts.append(f"<pre>{notebook.escape(chr(10).join(sketch(self.case, PAGE)))}</pre>")
         for heading, rows in case_sheet(self.case, self.numbers, Marked(self.case)).groups:
             pairs = [row for row in rows if not isinstance(row, Listing)]
-            parts += [notebook.columns(row) for row in rows if isinstance(row, Listing)]
             parts.append(notebook.table(pairs, heading))
+            parts += [notebook.columns(row) for row in rows if isinstance(row, Listing)]
         for key, heading in (
             ("notes", "To know"),
             ("without_effect", "Without effect in this case"),
@@ -152,17 +153,27 @@ def figure_of(run: Run, name: str | None, **options: Any) -> Figure:
     """
     from matplotlib import style
 
+    from mpm.fieldnames import drawable
     from mpm.pictures import STYLE, Fields, draw_field, pictures
 
     name = field_called(run, name)
-    if name in run.history and name != "time":
+    fields = drawable(run.snapshot().cell_data) if run.times else []
+    if name in fields:
+        return showable(draw_field(run, name, **options))
+    standard = {picture.name: picture for picture in pictures(run, Fields(run), lambda line: None)}
+    columns = [column for column in run.history if column != "time"]
+    if name not in (*standard, *columns):
+        accepted = (
+            f"a field ({', '.join(fields)}), a picture ({', '.join(standard)}), or a column of history.csv"
+        )
+        known = [*fields, *standard, *columns]
+        raise InputError.at(run.directory.path, "plot", repr(name), accepted, known=known, given=name)
+    if options:
+        raise InputError.at(None, "plot", f"{', '.join(options)} with {name}", "options with a field alone")
+    if name in columns:
         return showable(_curve(run, name))
-    known = list(pictures(run, Fields(run), lambda line: None)) if not options else []
-    for picture in known:
-        if picture.name == name:
-            with style.context(STYLE):
-                return showable(picture.draw())
-    return showable(draw_field(run, name, **options))
+    with style.context(STYLE):
+        return showable(standard[name].draw())
 
 
 def field_called(run: Run, name: str | None) -> str:
@@ -205,8 +216,8 @@ def _curve(run: Run, name: str) -> Figure:
         figure = Figure(figsize=(7.0, 3.2), layout="constrained")
         axes = figure.subplots()
         axes.plot(run.history["time"], run.history[name] / meant.factor)
-        unit = f" [{superscript(meant.unit_shown)}]" if meant.unit_shown else ""
-        axes.set(xlabel="time [s]", ylabel=literal(meant.label) + unit)
+        axes.set(xlabel="time [s]", ylabel=f"[{superscript(meant.unit_shown)}]" if meant.unit_shown else "")
+        axes.set_title(literal(meant.label), fontsize=9)
         axes.grid(alpha=0.25)
         figure.suptitle(name_of(run), fontsize=10)
     return figure

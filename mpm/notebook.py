@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mpm.case import Case
 
 LEFT = ' style="text-align: left"'
+PART = ' style="text-align: left; padding-left: 2em; font-weight: normal"'
 FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film")
 """Sections of a summary that people look at first."""
 
@@ -37,8 +38,11 @@ def paragraph(words: str, bold: bool = False) -> str:
 
 
 def table(rows: Iterable[tuple[str, str]], heading: str = "") -> str:
-    """Labels and values; nothing for no rows."""
-    lines = [f"<tr><th{LEFT}>{text(label)}</th><td{LEFT}>{text(value)}</td></tr>" for label, value in rows]
+    """Labels and values; nothing for no rows. A label that begins with a hard space is a part of the one above it."""
+    lines = [
+        f"<tr><th{PART if label.startswith(HARD_SPACE) else LEFT}>{text(label)}</th><td{LEFT}>{text(value)}</td></tr>"
+        for label, value in rows
+    ]
     if lines and heading:
         lines.insert(0, f'<tr><th colspan="2"{LEFT}>{text(heading)}</th></tr>')
     return f"<table>{''.join(lines)}</table>" if lines else ""

@@ -78,11 +78,15 @@ def test_run_without_a_summary_says_so(case: Case, tmp_path: Path) -> None:
     assert "not ended yet" in words(run._repr_html_()) and "not ended yet" in repr(run)
 
 
-def test_check_prints_and_is_a_mapping(case: Case) -> None:
-    """Fails when a report cannot be read as text, or its numbers not be asked for; or when a file, a name or overrides are not taken."""
+def test_check_prints_and_is_a_mapping(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when a report cannot be read as text (or rich, in a notebook, shows it elsewhere), or its numbers not be
+    asked for; or when a file, a name or overrides are not taken."""
     found = mpm.check("single_zone", {"motion.gamma": 0.4})
     assert found["motion"]["gamma"] == 0.4 and "inlets" in found and len(dict(found)) == len(found)
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setenv("FORCE_COLOR", "1")  # as a kernel has it
     text = str(found)
+    assert "\x1b" not in text
     assert "Single TMA zone" in text and "fluidisation" in text and max(map(len, text.splitlines())) <= 80
     assert mpm.check(case).case is case and mpm.check(case.to_dict())["motion"] == mpm.check(case)["motion"]
     with pytest.raises(InputError, match="single_zone"):
@@ -135,8 +139,15 @@ def test_other_pictures_and_names_that_are_none(result: Result) -> None:
     assert result.plot("history").axes
     first = result.plot("x_TMA", time=0.0)
     assert "t = 0 s" in first.get_suptitle() and "t = 0.5 s" in result.plot("x_TMA").get_suptitle()
-    with pytest.raises(InputError, match=r"did you mean velocity\?"):
-        result.plot("velosity")
+    for wrong, right in (
+        ("velosity", "velocity"),
+        ("titration.tma.exit_maen", "titration.tma.exit_mean"),
+        ("histroy", "history"),
+    ):
+        with pytest.raises(InputError, match=rf"did you mean {right}\?"):
+            result.plot(wrong)
+    with pytest.raises(InputError, match="time with history"):
+        result.plot("history", time=1.0)
 
 
 def test_plot_of_a_directory(result: Result, folder: Path) -> None:
