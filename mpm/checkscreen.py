@@ -37,6 +37,7 @@ class Marked:
         self.values = {
             name: replace(v, origin=(origins or {}).get(name, v.origin)) for name, v in found.items()
         }
+        self.used = False  # whether any mark has been given
 
     def text(self, name: str) -> str | None:
         """`3.5 cm/s (default)` of a dotted key; None where the case has no such value."""
@@ -46,6 +47,7 @@ class Marked:
     def mark(self, name: str) -> str:
         """` (default)`, ` (built-in)`, ` (base)`, ` (worked out)`, or nothing behind what was typed."""
         origin = self.values[name].origin if name in self.values else "typed"
+        self.used = self.used or origin != "typed"
         return "" if origin == "typed" else f" {together(f'({origin})')}"
 
 
@@ -61,14 +63,14 @@ def print_report(case: Case, report: dict[str, Any], console: Console) -> None:
     """Print the case, its numbers, what has no effect and what is questionable."""
     marked = Marked(case)
     say(console, printable(case.title) or "case", style="bold")
-    say(console, _what(case, report) + marked.mark("fidelity"))
+    say(console, f"{case.fidelity}{marked.mark('fidelity')}: {_what(case, report)}")
     console.print()
     for line in sketch(case, min(console.width, PAGE), pen_for(console.encoding)):
         console.print(line, soft_wrap=True)
     case_sheet(case, report, marked).print(console)
     _sentences(console, "To know", report["notes"])
     _sentences(console, "Without effect in this case", report["without_effect"])
-    if any(value.origin != "typed" for value in marked.values.values()):
+    if marked.used:
         _sentences(console, "Marks", [MARKS])
     if report["warnings"]:
         console.print()
@@ -114,9 +116,9 @@ def _sentences(console: Console, heading: str, sentences: list[str]) -> None:
 def _what(case: Case, report: dict[str, Any]) -> str:
     """The kind of run in words."""
     if case.fidelity == "steady":
-        return "steady: the state that the reactor settles into, as the mean of the vibration cycle"
+        return "the state that the reactor settles into, as the mean of the vibration cycle"
     how = "every phase of every cycle" if case.fidelity == "resolved" else "the mean of the vibration cycle"
-    return f"{case.fidelity}: {how}, 0 s to {case.time.end:g} s in {report['run']['steps']:,} steps"
+    return f"{how}, 0 s to {case.time.end:g} s in {report['run']['steps']:,} steps"
 
 
 def _strip(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
@@ -129,7 +131,7 @@ def _strip(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> 
         else "closed by walls"
     )
     sheet.add("ends", ends + marked.mark("geometry.periodic"))
-    if geometry.moving_layer is not None:
+    if case.conveying_velocity != 0.0:
         side = "left" if case.direction > 0 else "right"
         solids = {
             "fresh": f"fresh, at the {side}",
@@ -138,7 +140,8 @@ def _strip(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> 
         sheet.add("solids come in", solids[geometry.bed_inflow] + marked.mark("geometry.bed_inflow"))
     layers = Listing("layer", "height [mm]", "rows", "material")
     for layer in reversed(geometry.layers):
-        name = layer.name + (" (moving)" if layer.moving else "")
+        way = " (moving)" if case.conveying_velocity != 0.0 else " (does not move)"
+        name = layer.name + (way if layer.moving else "")
         height = f"{layer.height * 1e3:.6g}"
         layers.add_row(name, height, str(layer.cells), layer.material_name or "gas")
     sheet.list(layers)

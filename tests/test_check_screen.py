@@ -51,7 +51,7 @@ def test_defaults_are_marked() -> None:
         "3.5 cm/s (default), ",
         "from 0 s on (default)",
         "mean velocity of the bed 1.3 cm/s (default)",
-        "averaged: the mean of the vibration cycle, 0 s to 20 s",
+        "averaged (default): the mean of the vibration cycle, 0 s to 20 s",
         "end 20 s (default)",
         "porosity 0.4 permeability 5 um^2 tortuosity",
         "tortuosity factor 1.58114 (worked out)",
@@ -62,6 +62,13 @@ def test_defaults_are_marked() -> None:
     assert "mean velocity of the bed 1.3 cm/s straight" in words(own)
     built_in = words(load_case("single_zone"))
     assert "porosity 0.46 (built-in)" in built_in and "length 139.7 mm (base)" in built_in
+
+
+def test_a_resolved_case_has_no_marks(tmp_path: Path) -> None:
+    """Fails when the case that a run has written, in which every key stands, is said to leave something to defaults."""
+    (tmp_path / "case.toml").write_text(load_case(OWN).to_toml(), encoding="utf-8")
+    text = words(load_case(tmp_path / "case.toml"))
+    assert "(default)" not in text and "(base)" not in text and "Marks" not in text
 
 
 def test_what_is_silent_is_said() -> None:
@@ -81,6 +88,7 @@ def test_what_is_silent_is_said() -> None:
         assert part in text, part
     still = words(load_case(OWN, {"motion.bed_velocity": "0 m/s"}))
     assert "layer bed does not move (motion.bed_velocity is 0 cm/s)" in still and "molecules per" not in still
+    assert "solids come in" not in still
     fixed = load_case("single_zone", {"geometry.layer.bed.moving": False})
     assert "no layer moves" in notes(fixed)[0] and "geometry.layer.bed.moving" in notes(fixed)[0]
 
