@@ -19,6 +19,7 @@ from mpm.errors import InputError
 from mpm.files import is_file, read_text
 from mpm.materials import BUILT_IN
 from mpm.profile import PRESETS
+from mpm.spelling import quotes_advice
 
 Table = dict[str, Any]
 
@@ -66,7 +67,8 @@ def parse_toml(text: str, source: str | Path) -> Table:
             raise ValueError(f"tables or lists nested more than {DEEPEST} deep")
         return table
     except tomllib.TOMLDecodeError as error:
-        raise InputError.at(source, "", f"a TOML syntax error ({error})", "valid TOML") from None
+        found = f"a TOML syntax error ({error})"
+        raise InputError.at(source, "", found, f"valid TOML{quotes_advice(text, str(error))}") from None
     except (
         ValueError,
         RecursionError,

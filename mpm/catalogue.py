@@ -125,17 +125,18 @@ def _particles() -> Iterator[Entry]:
 
 
 def _runs() -> Iterator[Entry]:
-    """Directories of runs, newest first; those of the points of a sweep are listed by the sweep's own table."""
+    """Directories under results/ that a verb has written, newest first; the runs of a sweep are in its own table."""
     found = []
-    for path in sorted(RESULTS.glob("**/case.toml")) if RESULTS.is_dir() else ():
-        run = path.parent
-        if kind_of_directory(run) is RUN and "points" not in run.relative_to(RESULTS).parts:
-            found.append((max(file.stat().st_mtime for file in run.iterdir()), run))
-    for when, run in sorted(found, reverse=True):
-        yield Entry(str(run), _run_facts(run, when))
+    for path in sorted(RESULTS.glob("**/")) if RESULTS.is_dir() else ():
+        kind = kind_of_directory(path)
+        if kind is not None and "points" not in path.relative_to(RESULTS).parts:
+            found.append((max(file.stat().st_mtime for file in path.iterdir()), path, kind))
+    for when, path, kind in sorted(found, key=lambda entry: entry[:2], reverse=True):
+        date = time.strftime("%Y-%m-%d %H:%M", time.localtime(when))
+        yield Entry(str(path), _run_facts(path, date) if kind is RUN else f"{kind.words}, {date}")
 
 
-def _run_facts(run: Path, when: float) -> str:
+def _run_facts(run: Path, date: str) -> str:
     """Title, state, date and main number of a run; files that cannot be read count as missing."""
     try:
         summary: Mapping[str, Any] = json.loads((run / "summary.json").read_text(encoding="utf-8"))
@@ -143,7 +144,6 @@ def _run_facts(run: Path, when: float) -> str:
         summary = {}
     status = summary.get("status", f"not finished: mpm resume {run}")
     title = summary.get("title") or _title(run)
-    date = time.strftime("%Y-%m-%d %H:%M", time.localtime(when))
     numbers = [
         f"{quantity(name).label} {number_text(round(value, 4))}"
         for name, value in flatten(summary).items()

@@ -1,4 +1,4 @@
-"""Spellings of units that people use and that cannot be read, or mean something else: what to write instead."""
+"""Spellings that people use and that cannot be read, or mean something else: what to write instead, of units and in TOML."""
 
 from __future__ import annotations
 
@@ -42,3 +42,22 @@ def advice(symbol: str, wanted: Any, registry: Any) -> str:
     except Exception:  # of many types, as above
         return ""
     return f'; did you mean "{small:~C}"?' if small.dimensionality == wanted.dimensionality else ""
+
+
+_LINE = re.compile(r"\(at line (\d+),")
+_VALUE = re.compile(r"[^=#\[]+=\s*([^\s\"'\[{#][^\"'#]*?)\s*(?:#.*)?")
+
+
+def quotes_advice(text: str, error: str) -> str:
+    """What to write in the line that a TOML parser's `error` names, where only quotes (or small letters) are missing in it."""
+    number = _LINE.search(error)
+    lines = text.splitlines()
+    a_value = error.startswith(("Expected newline", "Invalid value"))
+    if number is None or not a_value or not 0 < int(number[1]) <= len(lines):
+        return ""
+    value = _VALUE.fullmatch(lines[int(number[1]) - 1])
+    if value is None:
+        return ""
+    if value[1] in ("True", "False"):
+        return f"; in line {number[1]} {value[1].lower()}, in small letters"
+    return f'; in line {number[1]} text and quantities in quotes, "{value[1]}"'

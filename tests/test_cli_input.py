@@ -330,6 +330,13 @@ BROKEN: dict[str, tuple[Edits, str, str]] = {
         "did you mean single_zone?",
     ),
     "TOML syntax": (swap("cells = 15", "cells = "), "", "TOML syntax error"),
+    "quantity without quotes": (swap('height = "5 mm"', "height = 5 mm"), "", 'quotes, "5 mm"'),
+    "word without quotes": (
+        swap('fidelity = "averaged"', "fidelity = steady  # now"),
+        "",
+        'quotes, "steady"',
+    ),
+    "switch in capitals": (swap("periodic = true", "periodic = True"), "", "true, in small letters"),
     "key twice": (swap("cells = 15", "cells = 15\ncells = 16"), "", "TOML syntax error"),
 }
 
@@ -368,6 +375,7 @@ def test_broken_case_is_refused_in_one_line(
     assert key in line.split(": found ")[0], line
     assert ": found " in line and "; accepted: " in line
     assert text in line, line
+    assert ("quotes" in line) == ("without quotes" in what or "quotes" in text), line
 
 
 @pytest.mark.parametrize(

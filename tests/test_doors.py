@@ -196,7 +196,8 @@ def test_list_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
             (run / "summary.json").write_text(summary)
     (folder / "results" / "sweep" / "sweep.json").write_text("{}")
     assert main(["list", "runs"]) == 0
-    done, stopped = sorted(capsys.readouterr().out.splitlines()[1:])
+    done, stopped, sweep = sorted(capsys.readouterr().out.splitlines()[1:])
+    assert "results/sweep" in sweep and "the directory of a sweep, 20" in sweep
     assert (
         done.strip().startswith("results/done")
         and "A title; done, 20" in done
