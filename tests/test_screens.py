@@ -175,7 +175,9 @@ def bare_numbers(text: str) -> list[str]:
             or set(line) <= set("0123456789 ")
         ):
             continue  # equations, commands, the numbers of ports in a sketch
-        line = re.sub(r"^\d+: ", "", line)  # an enumeration
+        line = re.sub(
+            r"^\d+: |(?<!\S)[0-9a-f]{8,}(?!\S)", "", line
+        )  # an enumeration, the name of a point or a revision
         label = re.split(r"(?<=\S)(?::|  )", line.strip(), maxsplit=1)[0]
         for clause in re.split(r"[,;:] | \(|\)(?=$|[ ,;:])|  +# ", line):
             after = [clause[match.end() :] for match in re.finditer(NUMBER, clause)]
