@@ -1,4 +1,4 @@
-"""`mpm list`: what comes with mpm (cases, geometries, materials, gases, mechanisms, powders), and the runs under results/."""
+"""`mpm list`: what comes with mpm (cases, geometries, materials, gases, mechanisms, sweeps, powders), and the runs under results/."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mpm.gases import CARRIERS
 from mpm.kinds import RUN, kind_of_directory
 from mpm.materials import BUILT_IN, SITE_DENSITIES
 from mpm.mechanism import Chemistry, build_mechanism
-from mpm.names import POWDER_FILES
+from mpm.names import POWDER_FILES, SWEEP_FILES
 from mpm.quantities import flatten, quantity
 from mpm.schema import for_people, number_text
 
@@ -113,6 +113,13 @@ def _powders() -> Iterator[Entry]:
         yield Entry(name, f"{data['title']}; powder {data['powder']}")
 
 
+def _sweeps() -> Iterator[Entry]:
+    for name, path in built_in_files(SWEEP_FILES).items():
+        table = read_toml(path)["sweep"]
+        axes = ", ".join(str(axis["key"]) for axis in table["axis"])
+        yield Entry(name, f"{table['title']}; case {Path(table['case']).stem} over {axes}")
+
+
 def _particles() -> Iterator[Entry]:
     from mpm.dem.powder import POWDERS
 
@@ -165,6 +172,7 @@ KINDS: dict[str, tuple[str, Callable[[], Iterator[Entry]]]] = {
     "materials": ('[[geometry.layer]] material = "NAME"; of your own: a table [material.NAME]', _materials),
     "gases": ('[gas] carrier = "NAME"; any other with molar_mass and viscosity', _gases),
     "mechanisms": ('[chemistry] mechanism = "NAME", or the path of a file', _mechanisms),
+    "sweeps": ("mpm sweep NAME", _sweeps),
     "powders": ("mpm dem NAME", _powders),
     "particles": ('powder = "NAME" in a powder file of mpm dem', _particles),
     "runs": ("mpm plot DIR, mpm report DIR, mpm resume DIR", _runs),

@@ -10,6 +10,8 @@ from mpm.files import is_file
 
 POWDER_FILES = "cases/dem"
 """Folder of the powder files that come with mpm."""
+SWEEP_FILES = "cases/sweeps"
+"""The same for sweep files."""
 
 
 def case_file(name: str) -> Path:
@@ -20,6 +22,11 @@ def case_file(name: str) -> Path:
 def powder_file(name: str) -> Path:
     """The file of a powder, for `mpm dem`: a path, or a built-in one by name."""
     return _file(name, POWDER_FILES, "the path of a powder file, or a built-in one")
+
+
+def sweep_file(name: str) -> Path:
+    """The file of a sweep: a path, or a built-in one by name."""
+    return _file(name, SWEEP_FILES, "the path of a sweep file, or a built-in one")
 
 
 def case_or_geometry(name: str) -> str | Path:

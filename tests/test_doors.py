@@ -12,9 +12,10 @@ from mpm.dem.case import load_case as load_powder
 from mpm.gases import CARRIERS
 from mpm.keys import all_keys
 from mpm.materials import BUILT_IN
-from mpm.names import POWDER_FILES
+from mpm.names import POWDER_FILES, SWEEP_FILES
 from mpm.newcase import SCHEMA_FILE, WIDTH, new_case
 from mpm.quantities import QUANTITIES
+from mpm.sweep.sweepfile import read_sweep
 
 ROOT = Path(__file__).parent.parent
 PROFILE = "phase_deg,u_x_m/s,u_y_m/s,contact\n0,0.01,0,1\n90,0.02,0,1\n180,0.01,0,0\n270,0.0,0,0\n"
@@ -169,7 +170,7 @@ def test_list_names_everything_that_has_a_name(folder: Path, capsys: pytest.Capt
     out = capsys.readouterr().out
     names = [
         *built_in_files("cases"), *built_in_files("meshes"), *built_in_files("mechanisms"), *built_in_files(POWDER_FILES),
-        *BUILT_IN, *CARRIERS, "GL50", "SS231",
+        *built_in_files(SWEEP_FILES), *BUILT_IN, *CARRIERS, "GL50", "SS231",
     ]  # fmt: skip
     assert [name for name in names if f"\n  {name} " not in out] == []
     assert "Single cycle of TMA and water" in out and "OH + TMA -> CH4 + OAl(CH3)2" in out
@@ -206,9 +207,11 @@ def test_list_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "A first case" in stopped and "not finished: mpm resume results/stopped" in stopped
 
 
-def test_built_in_powders_are_found_by_name() -> None:
+def test_built_in_powders_and_sweeps_are_found_by_name() -> None:
     for name, path in built_in_files(POWDER_FILES).items():
         assert load_powder(name) == load_powder(path)
+    for name, path in built_in_files(SWEEP_FILES).items():
+        assert read_sweep(name).path == path
 
 
 @pytest.mark.parametrize("key", all_keys(), ids=lambda key: key.name)

@@ -18,7 +18,8 @@ def list_(
     kind: Annotated[
         str | None,
         typer.Argument(
-            metavar="KIND", help="cases, geometries, materials, gases, mechanisms, powders, particles or runs"
+            metavar="KIND",
+            help="cases, geometries, materials, gases, mechanisms, sweeps, powders, particles or runs",
         ),
     ] = None,
 ) -> None:

@@ -15,7 +15,10 @@ from mpm.settings import parse_settings
 
 @app.command()
 def sweep(
-    path: Annotated[Path, typer.Argument(metavar="SWEEP.toml", help="a sweep file")],
+    path: Annotated[
+        str,
+        typer.Argument(metavar="SWEEP", help="a sweep file, or the name of a built-in one (mpm list sweeps)"),
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/SWEEP")
     ] = None,
@@ -28,8 +31,8 @@ def sweep(
 ) -> None:
     """Run, or go on with, a parameter sweep.
 
-    mpm sweep cases/sweeps/dose.toml -j 4          four points at a time, into results/dose
-    mpm sweep dose.toml --scheduler slurm          through Slurm, see docs/cluster.md
+    mpm sweep dose -j 4                            a built-in one, four points at a time, into results/dose
+    mpm sweep mine.toml --scheduler slurm          through Slurm, see docs/cluster.md
 
     The same command again goes on after an interruption and adds what an extended file asks for. The table is DIR/results.csv.
     """

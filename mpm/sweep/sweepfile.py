@@ -28,6 +28,7 @@ from mpm.case import Case, load_case
 from mpm.errors import InputError
 from mpm.files import is_file
 from mpm.kinds import SWEEP, parse_input, read_input_text
+from mpm.names import sweep_file
 from mpm.settings import file_in
 from mpm.sweep.conditions import Condition
 from mpm.sweep.quantities import Range, to_number, unit_as_written
@@ -234,7 +235,7 @@ def _idle(mode: str, table: Mapping[str, Any], items: Sequence[Any], axes: Seque
 
 def read_sweep(source: str | Path) -> Sweep:
     """Parse and check a sweep file and its base case; InputError for everything wrong with either."""
-    path = Path(source)
+    path = sweep_file(source) if isinstance(source, str) else source
     text = read_input_text(path, SWEEP)
     document = parse_input(path, text, SWEEP)
     if "sweep" not in document:
