@@ -155,6 +155,8 @@ UNIT = (
     r"(?:(?:Pa s|mol|[mcunk]?m|[mu]?s|min|h|%|K|Pa|Hz|deg|degC|GB|kJ/mol|g/mol|1/m|sccm/m|mol/m|umol/m|steps/s|square angstrom)(?![\w])"
     r"|(?:cm|mm|um|nm|m|kg|Pa|[mu]?mol|J|W|sites per|per)[ /^][\w/^ ]*)"
 )
+NO_NUMBERS = re.compile(r"^\d+: |(?<![\w.])[0-9a-f]{8,}(?!\w)|\b\d+:\d\d:\d\d\b")
+"""An enumeration, the name of a point or a revision, a time on the clock."""
 RATIOS = re.compile(
     r"\b(?:porosity|tortuosity[ _]factor|sphericity|fractions?|mass_fractions\.\w+|Knudsen|Reynolds|Re|Peclet|Damkoehler|Courant|Kn|over|"
     r"share|coverage|ratio|times|molecules|molecule|error|error of|particles of|balances|gamma|drawn back in|continuum|grading|"
@@ -175,9 +177,7 @@ def bare_numbers(text: str) -> list[str]:
             or set(line) <= set("0123456789 ")
         ):
             continue  # equations, commands, the numbers of ports in a sketch
-        line = re.sub(
-            r"^\d+: |(?<!\S)[0-9a-f]{8,}(?!\S)", "", line
-        )  # an enumeration, the name of a point or a revision
+        line = NO_NUMBERS.sub("", line)
         label = re.split(r"(?<=\S)(?::|  )", line.strip(), maxsplit=1)[0]
         for clause in re.split(r"[,;:] | \(|\)(?=$|[ ,;:])|  +# ", line):
             after = [clause[match.end() :] for match in re.finditer(NUMBER, clause)]
