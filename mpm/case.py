@@ -24,7 +24,7 @@ from pydantic import (
 )
 
 from mpm.caseio import assemble, write_toml
-from mpm.chemistry import Mechanism
+from mpm.chemistry import Mechanism, mole_fractions
 from mpm.files import read_text
 from mpm.gastable import Gas
 from mpm.kinds import CASE, read_input
@@ -218,6 +218,11 @@ class Case(Frozen):
     def conveying_velocity(self) -> float:
         """Mean velocity of the moving layer [m/s], negative to the left; 0 in a strip without one."""
         return 0.0 if self.geometry.moving_layer is None else self.motion.mean_velocity
+
+    def feed_concentrations(self, mass_fractions: Mapping[str, float]) -> dict[str, float]:
+        """Concentrations C_i = x_i p/(R T) [mol/m3] of a feed, with the mixture's mole fractions (it need not be dilute)."""
+        shares = mole_fractions(self.mechanism, self.gas.molar_mass, mass_fractions)
+        return {name: share * self.gas.molar_density for name, share in shares.items()}
 
     @property
     def follows_cycle(self) -> bool:

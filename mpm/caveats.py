@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpm.diffusion import carrier_ratio, scaled_diffusivity
-from mpm.elements import formula_mass
+from mpm.elements import formula_mass, parse_formula
 from mpm.gases import CARRIERS, ideal_gas_density
-from mpm.mechanism import parse_formula
 from mpm.phases import LastCycle
 from mpm.profile import PRESETS
 from mpm.schedule import Schedule

@@ -9,21 +9,18 @@ replaced by those at which every cell balances with that inflow: uptake up to wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mpm.local_newton import LOWEST, balance_locally
 
 if TYPE_CHECKING:
     from mpm.steady_system import SteadySystem
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-TRIES = 15  # Newton iterations in a cell
-TIGHT = 1e-12  # residual of a cell over what passes through it
-SHRINK = 0.05  # smallest factor on a concentration per iteration, which keeps it positive
-LOWEST = 1e-40  # mol/m3; zero itself is a kink of the rates
 NEGLIGIBLE = 1e-18  # of the largest feed, over the number of cells: a residual that needs no work
 
 
@@ -42,45 +39,13 @@ def balance_cells(system: SteadySystem, predicted: Floats, step: float) -> None:
     span, entering = system.entering(step)
     start = np.maximum(np.where(predicted > 0.0, predicted, system.concentration), LOWEST)
     idle = NEGLIGIBLE * transport.feed_rate / max(transport.strip.grid.cells, 1)
-    system.concentration = settle(
+    system.concentration = balance_locally(
         start,
         system.diagonal + storage,
         inflow,
         lambda c, active: _sources(system, c, active, entering, span, step),
         idle,
     )
-
-
-def settle(
-    concentration: Floats,
-    diagonal: Floats,
-    inflow: Floats,
-    sources: Callable[[Floats, Ints], tuple[Floats, Floats]],
-    idle: float,
-    tries: int = TRIES,
-) -> Floats:
-    """Concentrations (coupled, n) [mol/m3] at which every cell balances: diagonal C - source(C) = inflow.
-
-    Newton's method in all cells at once from positive `concentration`, on fewer and fewer of them; `diagonal` [m2/s] and `inflow`
-    [mol/m/s] are (coupled, n). `sources(c, active)` gives what reactions make in the cells `active` at concentrations `c` (coupled,
-    active) [mol/m/s] and its derivatives (active, coupled, coupled) [m2/s]. Residuals below `idle` [mol/m/s] need no work.
-    """
-    b = len(concentration)
-    c, active = concentration.copy(), np.arange(concentration.shape[1])
-    for _ in range(tries):
-        source, slope = sources(c[:, active], active)
-        held = diagonal[:, active] * c[:, active]
-        residual = held - inflow[:, active] - source
-        loose = (np.abs(residual) > TIGHT * (held + inflow[:, active]) + idle).any(axis=0)
-        active = active[loose]
-        if not len(active):
-            break
-        matrix = -slope[loose]
-        for i in range(b):
-            matrix[:, i, i] += diagonal[i, active]
-        change = np.linalg.solve(matrix, residual[:, loose].T[:, :, None])[:, :, 0].T
-        c[:, active] = np.maximum(np.maximum(c[:, active] - change, SHRINK * c[:, active]), LOWEST)
-    return c
 
 
 def _sources(

@@ -15,14 +15,7 @@ from mpm.caveats import (
     profile_caveats,
     steady_caveats,
 )
-from mpm.chemistry import inlet_concentrations, mole_fractions
-from mpm.dem.relations import (
-    mean_free_path,
-    minimum_fluidisation_velocity,
-    perfect_flight_velocity,
-    straight_drop_velocity,
-    wen_yu_minimum_fluidisation,
-)
+from mpm.chemistry import mole_fractions
 from mpm.geometry import Grid
 from mpm.idle import idle_keys
 from mpm.keys import values
@@ -30,6 +23,12 @@ from mpm.layout import Inlet, Layer
 from mpm.materials import Material
 from mpm.motion import Vibration
 from mpm.notes import notes, per_minute, sites_per_square_nanometre, standard_flow
+from mpm.physics.conveying import perfect_flight_velocity, straight_drop_velocity
+from mpm.physics.fluidisation import (
+    mean_free_path,
+    minimum_fluidisation_velocity,
+    wen_yu_minimum_fluidisation,
+)
 from mpm.saturation import coverage_met, slowest_turnover, uptake
 from mpm.schedule import Schedule
 
@@ -160,7 +159,7 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
         "sccm_per_metre": per_minute(standard),
         "mole_fractions": mole_fractions(case.mechanism, gas.molar_mass, inlet.mass_fractions),
         "Re": eng.reynolds(gas.density, inlet.velocity, inlet.width, gas.viscosity),
-        "concentrations": inlet_concentrations(case.mechanism, gas, inlet.mass_fractions),
+        "concentrations": case.feed_concentrations(inlet.mass_fractions),
     }
     found = eng.inlet_excess(case, inlet)
     if found is None or bed is None or bed.material is None:

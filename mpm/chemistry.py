@@ -15,15 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpm.constants import GAS_CONSTANT
-
-if TYPE_CHECKING:
-    from mpm.case import Gas
 
 Floats = NDArray[np.float64]
 
@@ -190,11 +186,3 @@ def mole_fractions(
     amounts = {name: share / mechanism.get(name).molar_mass for name, share in mass_fractions.items()}
     total = sum(amounts.values()) + (1.0 - sum(mass_fractions.values())) / carrier_molar_mass
     return {name: amount / total for name, amount in amounts.items()}
-
-
-def inlet_concentrations(
-    mechanism: Mechanism, gas: Gas, mass_fractions: Mapping[str, float]
-) -> dict[str, float]:
-    """Concentrations C_i = x_i p/(R T) [mol/m3] of a feed, with the mixture's mole fractions (it need not be dilute)."""
-    total = gas.pressure / (GAS_CONSTANT * gas.temperature)
-    return {name: x * total for name, x in mole_fractions(mechanism, gas.molar_mass, mass_fractions).items()}

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.constants import GAS_CONSTANT
 from mpm.geometry import ON_EDGE, Grid
 
 if TYPE_CHECKING:
@@ -167,7 +166,7 @@ def outlet_fractions(
     Amount of the species over amount of gas (volume times p/(R T)); the carrier by difference. Gas drawn back in does not count. An
     outlet that has let out nothing (`let_out`) has none.
     """
-    molar_density = total_concentration(case)
+    molar_density = case.gas.molar_density
     result = {}
     for k, outlet in enumerate(case.geometry.outlets):
         volume = let_out(case, totals, before, k)
@@ -187,11 +186,6 @@ def let_out(case: Case, totals: Totals, before: Totals | None, outlet: int) -> f
     volume = float(totals.out_volume[outlet] - (before.out_volume[outlet] if before else 0.0))
     strip = case.geometry.length * sum(layer.height for layer in case.geometry.layers)
     return volume if volume > NO_FLOW * strip else None
-
-
-def total_concentration(case: Case) -> float:
-    """p/(R T) [mol/m3]."""
-    return case.gas.pressure / (GAS_CONSTANT * case.gas.temperature)
 
 
 def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:

@@ -14,8 +14,8 @@ import math
 from collections.abc import Mapping
 
 from mpm.chemistry import Species
+from mpm.elements import parse_formula
 from mpm.gases import CARRIERS
-from mpm.mechanism import parse_formula
 
 REFERENCE_DIFFUSIVITY = 2.88e-5
 """[m2/s], in REFERENCE_CARRIER at REFERENCE_TEMPERATURE [K] and REFERENCE_PRESSURE [Pa]."""

@@ -1,7 +1,8 @@
-"""Standard atomic weights: what a formula says a molecule must weigh."""
+"""Chemical formulas: the atoms in them, and what these weigh."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 ATOMIC_WEIGHTS = {
@@ -19,8 +20,35 @@ ATOMIC_WEIGHTS = {
 """[g/mol]: IUPAC, abridged standard atomic weights of 2021, every element that has one outside the rarest."""
 
 
+_GROUP = re.compile(r"([A-Z][a-z]?)(\d*)|\(|\)(\d*)")
+
+
 def formula_mass(elements: Mapping[str, float]) -> float | None:
     """Molar mass [kg/mol] of what has these atoms; None without atoms, or with one that is no element of the table."""
     if not elements or not set(elements) <= set(ATOMIC_WEIGHTS):
         return None
     return sum(count * ATOMIC_WEIGHTS[element] for element, count in elements.items()) * 1e-3 or None
+
+
+def parse_formula(formula: str) -> dict[str, float]:
+    """Count the atoms of a formula such as `Al(CH3)3` or `OAl(CH3)2`; ValueError when it is none."""
+    stack: list[dict[str, float]] = [{}]
+    place = 0
+    while place < len(formula):
+        match = _GROUP.match(formula, place)
+        if match is None:
+            raise ValueError(f"{formula!r} is not a chemical formula")
+        place = match.end()
+        if match.group(1):
+            element, count = match.group(1), float(match.group(2) or 1)
+            stack[-1][element] = stack[-1].get(element, 0.0) + count
+        elif match.group() == "(":
+            stack.append({})
+        else:
+            if len(stack) == 1:
+                raise ValueError(f"{formula!r} closes a bracket that it did not open")
+            for element, count in stack.pop().items():
+                stack[-1][element] = stack[-1].get(element, 0.0) + count * float(match.group(3) or 1)
+    if len(stack) != 1:
+        raise ValueError(f"{formula!r} leaves a bracket open")
+    return stack[0]

@@ -1,7 +1,7 @@
 """What an engineer works out on paper before running a case: each number one short function with its source.
 
 SI units throughout; velocities of gas are superficial. Conveying limits and minimum fluidisation are those of
-`mpm.dem.relations`, which the DEM substudy uses as well. `mpm check` prints these numbers for a case.
+`mpm.physics`, which the DEM substudy uses as well. `mpm check` prints these numbers for a case.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from mpm.case import Case
-from mpm.chemistry import inlet_concentrations
 from mpm.geometry import Grid
 from mpm.layout import Inlet
 from mpm.materials import Material
@@ -48,7 +47,7 @@ def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float | None] | 
     bed, species = case.geometry.moving_layer, case.mechanism.precursor(inlet.mass_fractions)
     if bed is None or bed.material is None or species is None or case.motion.mean_velocity == 0.0:
         return None
-    concentration = inlet_concentrations(case.mechanism, case.gas, inlet.mass_fractions)[species]
+    concentration = case.feed_concentrations(inlet.mass_fractions)[species]
     material = bed.material
     if material.surface_to_volume == 0.0:
         return None

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.balances import FLOOR
-from mpm.chemistry import inlet_concentrations
 from mpm.diagnostics import (
     State,
     Totals,
@@ -107,7 +106,7 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
         if species is None or species not in state.concentration:
             continue
         field = state.concentration[species]
-        feed = inlet_concentrations(case.mechanism, case.gas, inlet.mass_fractions)[species]
+        feed = case.feed_concentrations(inlet.mass_fractions)[species]
         made = titrated(case, species, state.theta)
         entry: dict[str, Any] = {}
         for layer in case.geometry.layers:

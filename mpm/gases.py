@@ -42,6 +42,11 @@ def symbol(name: str) -> str:
     return _SPELT_OUT.get(name.lower(), name)
 
 
+def molar_density(pressure: float, temperature: float) -> float:
+    """Amount of an ideal gas per volume, p/(R T) [mol/m3]."""
+    return pressure / (GAS_CONSTANT * temperature)
+
+
 def ideal_gas_density(pressure: float, molar_mass: float, temperature: float) -> float:
     """Density p M/(R T) [kg/m3] of an ideal gas; pressure [Pa], molar mass [kg/mol], temperature [K]."""
     return pressure * molar_mass / (GAS_CONSTANT * temperature)

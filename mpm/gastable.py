@@ -8,7 +8,7 @@ from pydantic import Field, PrivateAttr, WithJsonSchema, model_validator
 
 from mpm.chemistry import Mechanism
 from mpm.diffusion import scaled_diffusivity
-from mpm.gases import CARRIERS, ideal_gas_density, symbol
+from mpm.gases import CARRIERS, ideal_gas_density, molar_density, symbol
 from mpm.layout import Frozen
 from mpm.units import (
     DIFFUSIVITY,
@@ -76,6 +76,11 @@ class Gas(Frozen):
             in_range(f"gas.diffusivity.{name}", value, "m^2/s")
         values = {**default, **self.diffusivity}
         self.__dict__["diffusivity"] = {name: values[name] for name in mechanism.species_names}
+
+    @property
+    def molar_density(self) -> float:
+        """p/(R T) [mol/m3]."""
+        return molar_density(self.pressure, self.temperature)
 
     @model_validator(mode="after")
     def _fill_in(self) -> Self:

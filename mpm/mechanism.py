@@ -17,6 +17,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSche
 from pydantic_core import PydanticCustomError
 
 from mpm.chemistry import GasReaction, Mechanism, Site, Species, SurfaceReaction
+from mpm.elements import parse_formula
 from mpm.equation import ARROW, parse_equation, write_equation
 from mpm.schema import DRAFT, finished
 from mpm.units import (
@@ -151,31 +152,6 @@ def mechanism_schema() -> dict[str, Any]:
 
 
 _NAME = re.compile(r"[^\s.]+")
-_GROUP = re.compile(r"([A-Z][a-z]?)(\d*)|\(|\)(\d*)")
-
-
-def parse_formula(formula: str) -> dict[str, float]:
-    """Count the atoms of a formula such as `Al(CH3)3` or `OAl(CH3)2`; ValueError when it is none."""
-    stack: list[dict[str, float]] = [{}]
-    place = 0
-    while place < len(formula):
-        match = _GROUP.match(formula, place)
-        if match is None:
-            raise ValueError(f"{formula!r} is not a chemical formula")
-        place = match.end()
-        if match.group(1):
-            element, count = match.group(1), float(match.group(2) or 1)
-            stack[-1][element] = stack[-1].get(element, 0.0) + count
-        elif match.group() == "(":
-            stack.append({})
-        else:
-            if len(stack) == 1:
-                raise ValueError(f"{formula!r} closes a bracket that it did not open")
-            for element, count in stack.pop().items():
-                stack[-1][element] = stack[-1].get(element, 0.0) + count * float(match.group(3) or 1)
-    if len(stack) != 1:
-        raise ValueError(f"{formula!r} leaves a bracket open")
-    return stack[0]
 
 
 RESERVED_SPECIES = {

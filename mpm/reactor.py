@@ -19,7 +19,7 @@ from mpm import checkpoint, fem  # fem first: it loads the finite-element stack
 from mpm.balances import LIMIT, require_balance, worst_balance
 from mpm.bed import Bed
 from mpm.checks import check_case
-from mpm.diagnostics import State, Totals, total_concentration
+from mpm.diagnostics import State, Totals
 from mpm.dispersion import vibrational_dispersion
 from mpm.errors import ConvergenceError, InputError, Interrupted, StorageError, printable, storage_error
 from mpm.flownumbers import flux_profiles
@@ -497,7 +497,7 @@ class Reactor:
         own = self.strip.owned
         concentration = dict(zip(self.transport.names, self.transport.concentration, strict=True))
         fields: dict[str, Floats] = {}
-        whole = total_concentration(self.case)
+        whole = self.case.gas.molar_density
         carrier = np.ones(own)
         for name in self.case.mechanism.species_names:
             c = concentration.get(name, np.zeros(own))

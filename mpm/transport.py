@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.bed import Bed
-from mpm.cellbalance import LOWEST, settle
 from mpm.cellmatrix import CellMatrix, StepMatrix
-from mpm.chemistry import inlet_concentrations
 from mpm.errors import ConvergenceError
 from mpm.flow import FaceFlow
 from mpm.fluxes import FluxAssembler, FluxOperator
 from mpm.kinetics import GasKinetics, Roles, SurfaceKinetics
+from mpm.local_newton import LOWEST, balance_locally
 from mpm.parallel import largest, total
 from mpm.solvers import KrylovSolver
 from mpm.strip import Strip
@@ -76,8 +75,7 @@ class Transport:
         self.case, self.strip, self.bed = case, strip, bed
         mechanism = case.mechanism
         self.feed = {
-            inlet.name: inlet_concentrations(mechanism, case.gas, inlet.mass_fractions)
-            for inlet in case.geometry.inlets
+            inlet.name: case.feed_concentrations(inlet.mass_fractions) for inlet in case.geometry.inlets
         }
         fed = {name for amounts in self.feed.values() for name, c in amounts.items() if c > 0.0}
         self.roles = Roles.of(mechanism, fed)
@@ -326,7 +324,7 @@ class Transport:
         """Concentrations (coupled, reactive cells) at which those cells balance with their inflow under the iterate `new`.
 
         A linear step sends the front too far or not far enough, because it does not see the sites of a cell run out
-        (`mpm.cellbalance`); this takes a third off the Newton iterations.
+        (`mpm.local_newton`); this takes a third off the Newton iterations.
         """
         cells, nu = self.bed.cells, self.nu_surface[:, : len(new)]
         product = np.stack([m.multiply(c) for m, c in zip(matrices, new, strict=True)])
@@ -339,7 +337,7 @@ class Transport:
 
         idle = UNDERSHOOT * self.feed_rate
         start = np.maximum(new[:, cells], LOWEST)
-        settled = settle(start, diagonal[:, cells], inflow, sources, idle, tries=3)
+        settled = balance_locally(start, diagonal[:, cells], inflow, sources, idle, tries=3)
         return np.where(inflow > 0.0, settled, 0.0)
 
     def book(

@@ -9,10 +9,10 @@ import pytest
 from pydantic_core import PydanticCustomError
 
 from mpm.case import Case, load_case
-from mpm.chemistry import inlet_concentrations, mole_fractions
+from mpm.chemistry import mole_fractions
+from mpm.elements import parse_formula
 from mpm.equation import parse_equation
 from mpm.errors import InputError
-from mpm.mechanism import parse_formula
 
 EXAMPLE = Path(__file__).parent / "example_case.toml"
 R = 8.31446261815324
@@ -270,7 +270,7 @@ def test_rate_laws_that_do_not_fit_are_refused(reaction: dict[str, Any], text: s
 
 def test_inlet_concentration_uses_the_mixture(case: Case) -> None:
     """C = x p/(R T) with x the mole fraction: the thesis' dose, and a feed that is half precursor by mass."""
-    dose = inlet_concentrations(case.mechanism, case.gas, {"TMA": 2e-4})
+    dose = case.feed_concentrations({"TMA": 2e-4})
     assert dose["TMA"] == pytest.approx(2.0024e-3, rel=1e-4)
     x = mole_fractions(case.mechanism, 0.02801, {"TMA": 0.5})["TMA"]
     assert x == pytest.approx((0.5 / 0.07209) / (0.5 / 0.07209 + 0.5 / 0.02801), rel=1e-14)

@@ -15,9 +15,9 @@ from mpm.dem.case import load_case
 from mpm.dem.gas import GasDrag, slab_solids
 from mpm.dem.powder import POWDERS
 from mpm.dem.profile import Profile, conditions, piecewise_fit, scaled_to_mean
-from mpm.dem.relations import minimum_fluidisation_velocity
 from mpm.dem.waveform import Sawtooth, sine
 from mpm.errors import InputError
+from mpm.physics.fluidisation import minimum_fluidisation_velocity
 from mpm.profile import read_profile
 
 WAVE = sine(0.3, 16.0, math.radians(60))

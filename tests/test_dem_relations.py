@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from mpm.dem import relations as rel
 from mpm.dem.bed import bond_numbers
 from mpm.dem.case import load_case
 from mpm.dem.cohesion import largest_force, reduced_hamaker, rumpf_force
@@ -14,6 +13,7 @@ from mpm.dem.powder import POWDERS
 from mpm.dem.simulate import build
 from mpm.errors import InputError
 from mpm.gases import ideal_gas_density
+from mpm.physics import conveying, fluidisation
 
 AIR = ideal_gas_density(101325.0, 29e-3, 293.15)
 MU = 18e-6
@@ -23,18 +23,18 @@ def test_conveying_limits():
     """16 Hz, Gamma 0.30, 60 deg: 0.538 and 1.690 cm/s; throw number is the Gamma it was made from."""
     z = 0.30 * 9.81 / (2 * math.pi * 16) ** 2
     x = z / math.tan(math.radians(60))
-    assert rel.straight_drop_velocity(x, 16.0) == pytest.approx(0.5380e-2, rel=1e-3)
-    assert rel.perfect_flight_velocity(x, 16.0) == pytest.approx(1.6902e-2, rel=1e-3)
-    assert rel.throw_number(z * (2 * math.pi * 16) ** 2) == pytest.approx(0.30)
-    assert rel.throw_number(0.30 * 9.81, math.radians(9)) == pytest.approx(0.30 * 1.01247, rel=1e-4)
-    assert rel.efficiency(-0.5, 2.0) == 0.25
+    assert conveying.straight_drop_velocity(x, 16.0) == pytest.approx(0.5380e-2, rel=1e-3)
+    assert conveying.perfect_flight_velocity(x, 16.0) == pytest.approx(1.6902e-2, rel=1e-3)
+    assert conveying.throw_number(z * (2 * math.pi * 16) ** 2) == pytest.approx(0.30)
+    assert conveying.throw_number(0.30 * 9.81, math.radians(9)) == pytest.approx(0.30 * 1.01247, rel=1e-4)
+    assert conveying.efficiency(-0.5, 2.0) == 0.25
 
 
 def test_slip_onset():
     """mu 0.4 at 60 deg: no slip below Gamma 0.41; mu above cot b never slips backwards."""
-    forward, backward = rel.slip_onset(0.4, math.radians(60))
+    forward, backward = conveying.slip_onset(0.4, math.radians(60))
     assert forward == pytest.approx(0.4 / (1 / math.sqrt(3) + 0.4)) and backward > forward
-    assert rel.slip_onset(0.6, math.radians(60))[1] == math.inf
+    assert conveying.slip_onset(0.6, math.radians(60))[1] == math.inf
 
 
 @pytest.mark.parametrize(
@@ -48,9 +48,9 @@ def test_slip_onset():
 )
 def test_kozeny_constants_of_table_5_4(porosity, surface, permeability, low, high):
     """The constant from porosity, surface and permeability lies in the interval that rounding allows."""
-    constant = rel.kozeny_carman_constant(porosity, surface, permeability)
+    constant = fluidisation.kozeny_carman_constant(porosity, surface, permeability)
     assert low <= constant <= high
-    assert rel.kozeny_carman_permeability(porosity, surface, constant) == pytest.approx(permeability)
+    assert fluidisation.kozeny_carman_permeability(porosity, surface, constant) == pytest.approx(permeability)
 
 
 @pytest.mark.parametrize(
@@ -65,18 +65,20 @@ def test_kozeny_constants_of_table_5_4(porosity, surface, permeability, low, hig
 def test_minimum_fluidisation_against_the_reference(name, ergun46, wen_yu):
     """Reference table umf.csv at a voidage of 0.46 [cm/s]; Gidaspow's dense branch is Ergun's."""
     p = POWDERS[name]
-    ergun = rel.minimum_fluidisation_velocity(p.diameter, p.sphericity, p.density, 0.46, MU, AIR, *p.ergun)
-    gidaspow = rel.minimum_fluidisation_velocity(
+    ergun = fluidisation.minimum_fluidisation_velocity(
+        p.diameter, p.sphericity, p.density, 0.46, MU, AIR, *p.ergun
+    )
+    gidaspow = fluidisation.minimum_fluidisation_velocity(
         p.diameter, p.sphericity, p.density, 0.46, MU, AIR, *p.ergun, law="gidaspow"
     )
     assert 100 * ergun == pytest.approx(ergun46, rel=1e-3)
     assert gidaspow == pytest.approx(ergun, rel=1e-9)
-    assert 100 * rel.wen_yu_minimum_fluidisation(p.diameter, p.density, MU, AIR) == pytest.approx(
+    assert 100 * fluidisation.wen_yu_minimum_fluidisation(p.diameter, p.density, MU, AIR) == pytest.approx(
         wen_yu, rel=1e-3
     )
     # A loose bed (0.40-0.56) reaches the measured value for every powder.
     speeds = [
-        rel.minimum_fluidisation_velocity(p.diameter, p.sphericity, p.density, e, MU, AIR, *p.ergun)
+        fluidisation.minimum_fluidisation_velocity(p.diameter, p.sphericity, p.density, e, MU, AIR, *p.ergun)
         for e in (0.40, 0.56)
     ]
     assert p.measured_umf is not None and speeds[0] < p.measured_umf < speeds[1]
@@ -84,8 +86,8 @@ def test_minimum_fluidisation_against_the_reference(name, ergun46, wen_yu):
 
 def test_drag_is_continuous_in_the_slip_and_finite_at_rest():
     """Fails if the dilute branch divides by a slip of zero or has another limit there."""
-    still = rel.gidaspow_beta(np.array([0.5, 0.9, 1.0]), np.zeros(3), 50e-6, 0.8, MU, AIR)
-    slow = rel.gidaspow_beta(np.array([0.5, 0.9, 1.0]), np.full(3, 1e-9), 50e-6, 0.8, MU, AIR)
+    still = fluidisation.gidaspow_beta(np.array([0.5, 0.9, 1.0]), np.zeros(3), 50e-6, 0.8, MU, AIR)
+    slow = fluidisation.gidaspow_beta(np.array([0.5, 0.9, 1.0]), np.full(3, 1e-9), 50e-6, 0.8, MU, AIR)
     assert still == pytest.approx(slow, rel=1e-3) and still[2] == 0.0
     assert np.isfinite(still).all()
 
@@ -95,14 +97,18 @@ def test_granular_bond_numbers_of_the_seed():
     for name, pair, wall in (("GL50", 23.8, None), ("GL56", 19.0, 76.0)):
         p = POWDERS[name]
         force = largest_force(p.hamaker, p.diameter / 4, p.asperity)
-        assert rel.granular_bond_number(force, p.diameter, p.density) == pytest.approx(pair, rel=5e-3)
+        assert fluidisation.granular_bond_number(force, p.diameter, p.density) == pytest.approx(
+            pair, rel=5e-3
+        )
         if wall:
             force = largest_force(p.wall_hamaker, p.diameter / 2, p.asperity)
-            assert rel.granular_bond_number(force, p.diameter, p.density) == pytest.approx(wall, rel=5e-3)
+            assert fluidisation.granular_bond_number(force, p.diameter, p.density) == pytest.approx(
+                wall, rel=5e-3
+            )
     p = POWDERS["GL50"]
-    assert rel.granular_bond_number(largest_force(4e-19, 12.5e-6, 1e-9), 50e-6, 2500) == pytest.approx(
-        307, rel=5e-3
-    )
+    assert fluidisation.granular_bond_number(
+        largest_force(4e-19, 12.5e-6, 1e-9), 50e-6, 2500
+    ) == pytest.approx(307, rel=5e-3)
 
 
 def test_rumpf_force_is_held_inside_and_ends_outside():
@@ -117,15 +123,17 @@ def test_single_particle_drag_estimates():
     slip, d = 0.02, 50e-6
     reynolds = AIR * slip * d / MU
     assert reynolds < 0.1
-    stokes = rel.drag_force(rel.stokes_drag_coefficient(reynolds), AIR, slip, d)
+    stokes = fluidisation.drag_force(fluidisation.stokes_drag_coefficient(reynolds), AIR, slip, d)
     assert stokes == pytest.approx(3 * math.pi * MU * d * slip, rel=1e-12)
-    knudsen = rel.drag_force(rel.knudsen_drag_coefficient(reynolds, 1.0), AIR, slip, d)
-    crowd = rel.drag_force(rel.ergun_drag_coefficient(reynolds), AIR, slip, d)
+    knudsen = fluidisation.drag_force(fluidisation.knudsen_drag_coefficient(reynolds, 1.0), AIR, slip, d)
+    crowd = fluidisation.drag_force(fluidisation.ergun_drag_coefficient(reynolds), AIR, slip, d)
     cohesion = largest_force(3.1e-20, 12.5e-6, 1e-9)
     assert knudsen == pytest.approx(stokes / 3.976, rel=0.03)
     assert crowd / stokes == pytest.approx(15.0, rel=0.01)
     assert knudsen < stokes < crowd < cohesion
-    assert rel.mean_free_path(17.6e-6, 2 * 133.32, 293.15, 28.01e-3) == pytest.approx(25e-6, rel=0.05)
+    assert fluidisation.mean_free_path(17.6e-6, 2 * 133.32, 293.15, 28.01e-3) == pytest.approx(
+        25e-6, rel=0.05
+    )
 
 
 def test_collision_time_and_damping():

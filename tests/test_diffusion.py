@@ -4,7 +4,7 @@ import pytest
 
 from mpm.case import Case, load_case
 from mpm.diffusion import carrier_ratio, diffusion_volume
-from mpm.mechanism import parse_formula
+from mpm.elements import parse_formula
 
 
 def gas_case(**gas: object) -> Case:

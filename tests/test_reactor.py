@@ -13,7 +13,6 @@ import pytest
 
 import mpm.transport
 from mpm.case import Case
-from mpm.chemistry import inlet_concentrations
 from mpm.errors import ConvergenceError
 from mpm.reactor import Reactor
 from mpm.transport import Transport
@@ -102,10 +101,10 @@ def test_every_mode_conserves(mode: str, tmp_path: Path) -> None:
     if mode == "ports that reverse in the lab":
         assert reactor.transport.ledger.back.sum() > 0.0, "no outlet drew gas back in"
     if mode == "dose windows":
-        feed = inlet_concentrations(reactor.case.mechanism, reactor.case.gas, {"TMA": 2e-4})["TMA"]
+        feed = reactor.case.feed_concentrations({"TMA": 2e-4})["TMA"]
         assert tma["fed"] == pytest.approx(0.035 * 4e-3 * feed * (0.233 + 0.22), rel=1e-9)
     if mode == "inlet diffusion":
-        feed = inlet_concentrations(reactor.case.mechanism, reactor.case.gas, {"TMA": 2e-4})["TMA"]
+        feed = reactor.case.feed_concentrations({"TMA": 2e-4})["TMA"]
         assert tma["fed"] > 1.02 * 0.035 * 4e-3 * feed * reactor.time
     if mode == "high dose, long steps":
         assert result.summary["species"]["Al(OH)3"]["produced"] > 0.0
@@ -160,10 +159,7 @@ def test_both_precursors_and_their_reaction_in_the_gas() -> None:
     # with equal diffusivities TMA + CH4 + 4/3 H2O + 2 Al(OH)3 is untouched by all three reactions: it stays what the inlets feed
     c = {n: result.field(f"C_{n}") for n in ("TMA", "CH4", "H2O", "Al(OH)3")}
     whole = c["TMA"] + c["CH4"] + 4.0 / 3.0 * c["H2O"] + 2.0 * c["Al(OH)3"]
-    feed = {
-        n: inlet_concentrations(case.mechanism, case.gas, {n: y})[n]
-        for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))
-    }
+    feed = {n: case.feed_concentrations({n: y})[n] for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))}
     assert whole.max() < max(feed["TMA"], 4.0 / 3.0 * feed["H2O"]) * (1 + 1e-9)
 
 
@@ -172,10 +168,7 @@ def test_a_combination_that_no_reaction_touches() -> None:
     changes = {"time.end": "4 s", "time.step": "20 ms", "output.every": "1 s"}
     case = cycle(changes, TINY)
     _, reacting = run(case)
-    feed = {
-        n: inlet_concentrations(case.mechanism, case.gas, {n: y})[n]
-        for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))
-    }
+    feed = {n: case.feed_concentrations({n: y})[n] for n, y in (("TMA", 2e-4), ("H2O", 7.5e-5))}
     # feed methane instead, in the same amounts of the combination: nothing reacts
     inert: dict[str, np.ndarray] = {}
     for inlet, name, weight in (("tma", "TMA", 1.0), ("water", "H2O", 4.0 / 3.0)):
@@ -186,7 +179,7 @@ def test_a_combination_that_no_reaction_touches() -> None:
         }
         methane = case.with_(replaced)
         _, result = run(methane)
-        fed = inlet_concentrations(methane.mechanism, methane.gas, {"CH4": 1e-4})["CH4"]
+        fed = methane.feed_concentrations({"CH4": 1e-4})["CH4"]
         inert[inlet] = result.field("C_CH4") * weight * feed[name] / fed
     c = {n: reacting.field(f"C_{n}") for n in ("TMA", "CH4", "H2O", "Al(OH)3")}
     whole = c["TMA"] + c["CH4"] + 4.0 / 3.0 * c["H2O"] + 2.0 * c["Al(OH)3"]

@@ -5,16 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from .bed import bed_numbers
-from .box import BoxSpec
-from .case import DemCase
-from .profile import PiecewiseFit, Profile, piecewise_fit
-from .relations import (
+from mpm.physics.conveying import (
     efficiency,
     perfect_flight_velocity,
     straight_drop_velocity,
     throw_number,
 )
+
+from .bed import bed_numbers
+from .box import BoxSpec
+from .case import DemCase
+from .profile import PiecewiseFit, Profile, piecewise_fit
 from .waveform import Waveform, extension_velocity, peak_displacement
 
 Arrays = dict[str, np.ndarray]

@@ -4,11 +4,16 @@ from typing import Any
 
 import numpy as np
 
+from mpm.physics.fluidisation import (
+    granular_bond_number,
+    minimum_fluidisation_velocity,
+    wen_yu_minimum_fluidisation,
+)
+
 from ..constants import GRAVITY
 from .box import BoxSpec
 from .case import DemCase
 from .cohesion import largest_force
-from .relations import granular_bond_number, minimum_fluidisation_velocity, wen_yu_minimum_fluidisation
 
 
 def bond_numbers(spec: BoxSpec) -> dict[str, float]:

@@ -19,6 +19,7 @@ from mpm.errors import InputError
 from mpm.gases import ideal_gas_density
 from mpm.kinds import POWDER, read_input
 from mpm.names import powder_file
+from mpm.physics.fluidisation import mean_free_path
 from mpm.schema import DRAFT, finished
 from mpm.units import (
     Density,
@@ -38,7 +39,6 @@ from mpm.units import (
 
 from .powder import POWDERS, SMALLEST, Powder
 from .reading import one_line, set_dotted
-from .relations import mean_free_path
 from .waveform import Waveform
 from .waveform_input import MeasuredInput, Section, WaveformInput
 

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mpm.physics.fluidisation import gidaspow_beta
+
 from .powder import Powder
-from .relations import gidaspow_beta
 
 SLAB = 2.5  # height of a slab in mean diameters, the seed's grid of the gas
 

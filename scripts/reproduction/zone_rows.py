@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.case import Case
-from mpm.chemistry import inlet_concentrations
 from mpm.engineering import inlet_excess
 from mpm.fronts import coverage_front, layer_mean
 from mpm.results import Run, sites_made_by
@@ -37,7 +36,7 @@ def excess(case: Case) -> float:
 def feed(case: Case) -> float:
     """Concentration of TMA in its inlet [mol/m3]."""
     inlet = next(i for i in case.geometry.inlets if i.name == "tma")
-    return inlet_concentrations(case.mechanism, case.gas, inlet.mass_fractions)["TMA"]
+    return case.feed_concentrations(inlet.mass_fractions)["TMA"]
 
 
 def increasing(values: list[float], margin: float = 0.0) -> bool:

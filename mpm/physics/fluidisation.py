@@ -1,61 +1,14 @@
-"""Engineering relations beside the DEM: conveying limits, permeability, fluidisation, drag.
+"""Gas through packed and fluidised beds of particles, and forces on one particle.
 
-SI throughout. "Seed" is the thesis whose chapters 2-5 this package follows; equation numbers are its own.
+SI throughout. "Seed" is the thesis whose chapters 2-5 the model follows; equation numbers are its own.
 """
 
 import math
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import brentq
 
-from ..constants import GAS_CONSTANT, GRAVITY
-
-# Conveying -----------------------------------------------------------------------------------------
-
-
-def straight_drop_velocity(displacement: float, frequency: float) -> float:
-    """Mean velocity [m/s] of a bed that moves with the base on extension and falls straight on retraction.
-
-    v = 2 X f with the displacement amplitude X [m] along the conveyor and f [Hz] (seed 2.4.2). The seed prints 1.08 cm/s
-    (226 um in 20.83 ms) for the waveform of table 2.2: that is the vertical amplitude, 113.0 um. The one along the
-    conveyor, from which it has its perfect flight of 3.51 cm/s, is 116.3 um and gives 1.117 cm/s.
-    """
-    return 2.0 * displacement * frequency
-
-
-def perfect_flight_velocity(displacement: float, frequency: float) -> float:
-    """Mean velocity [m/s] of a bed always launched at the base's largest velocity: v = 2 pi f X (seed 2.4.2)."""
-    return 2.0 * math.pi * frequency * displacement
-
-
-def throw_number(acceleration: float, declination: float = 0.0) -> float:
-    """Largest downward acceleration of the base [m/s2], normal to it, over the normal component of gravity, a/(g cos alpha).
-
-    `declination` alpha in rad. Above 1 a particle is thrown without the help of gas. The seed's Gamma is that of a level
-    base, A_v/g, also where the conveyor is declined (section 3.6): 1.2 % less at 9 deg.
-    """
-    return acceleration / (GRAVITY * math.cos(declination))
-
-
-def slip_onset(friction: float, angle: float) -> tuple[float, float]:
-    """Throw numbers (forward, backward) above which a rigid block slips on a sinusoidal conveyor.
-
-    Gamma_forward = mu/(cot b + mu), Gamma_backward = mu/(cot b - mu) with b [rad] the angle of vibration from
-    the base (classic conveyor theory, e.g. Gaberson 1972; Sloot and Kruyt 1996). Backward is infinite when
-    mu >= cot b: the block never slips backwards.
-    """
-    cotangent = 1.0 / math.tan(angle)
-    backward = friction / (cotangent - friction) if cotangent > friction else math.inf
-    return friction / (cotangent + friction), backward
-
-
-def efficiency(mean_velocity: float, extension_velocity: float) -> float:
-    """Convection efficiency, |mean bed velocity / largest base velocity on extension| (2-13)."""
-    return abs(mean_velocity / extension_velocity)
-
-
-# Packed beds ---------------------------------------------------------------------------------------
+from mpm.constants import GAS_CONSTANT, GRAVITY
 
 
 def kozeny_carman_permeability(porosity: float, surface_to_volume: float, constant: float = 5.0) -> float:
@@ -128,6 +81,8 @@ def minimum_fluidisation_velocity(
         )  # fmt: skip
         return float(beta) * velocity / porosity**2 - (1.0 - porosity) * weight
 
+    from scipy.optimize import brentq  # most of a second to load, which the closed form does not need
+
     return float(brentq(excess, 1e-9, 10.0))
 
 
@@ -138,9 +93,6 @@ def wen_yu_minimum_fluidisation(
     archimedes = density_gas * (density_solid - density_gas) * GRAVITY * diameter**3 / viscosity**2
     reynolds = math.sqrt(33.7**2 + 0.0408 * archimedes) - 33.7
     return reynolds * viscosity / (density_gas * diameter)
-
-
-# Single-particle force estimates (supplement A) ------------------------------------------------------
 
 
 def granular_bond_number(cohesion: float, diameter: float, density: float) -> float:

@@ -1,0 +1,47 @@
+"""Newton's method in every cell by itself (nonlinear elimination): concentrations at which reactions balance a given inflow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+TRIES = 15  # Newton iterations in a cell
+TIGHT = 1e-12  # residual of a cell over what passes through it
+SHRINK = 0.05  # smallest factor on a concentration per iteration, which keeps it positive
+LOWEST = 1e-40  # mol/m3; zero itself is a kink of the rates
+
+
+def balance_locally(
+    concentration: Floats,
+    diagonal: Floats,
+    inflow: Floats,
+    sources: Callable[[Floats, Ints], tuple[Floats, Floats]],
+    idle: float,
+    tries: int = TRIES,
+) -> Floats:
+    """Concentrations (coupled, n) [mol/m3] at which every cell balances: diagonal C - source(C) = inflow.
+
+    Newton's method in all cells at once from positive `concentration`, on fewer and fewer of them; `diagonal` [m2/s] and `inflow`
+    [mol/m/s] are (coupled, n). `sources(c, active)` gives what reactions make in the cells `active` at concentrations `c` (coupled,
+    active) [mol/m/s] and its derivatives (active, coupled, coupled) [m2/s]. Residuals below `idle` [mol/m/s] need no work.
+    """
+    b = len(concentration)
+    c, active = concentration.copy(), np.arange(concentration.shape[1])
+    for _ in range(tries):
+        source, slope = sources(c[:, active], active)
+        held = diagonal[:, active] * c[:, active]
+        residual = held - inflow[:, active] - source
+        loose = (np.abs(residual) > TIGHT * (held + inflow[:, active]) + idle).any(axis=0)
+        active = active[loose]
+        if not len(active):
+            break
+        matrix = -slope[loose]
+        for i in range(b):
+            matrix[:, i, i] += diagonal[i, active]
+        change = np.linalg.solve(matrix, residual[:, loose].T[:, :, None])[:, :, 0].T
+        c[:, active] = np.maximum(np.maximum(c[:, active] - change, SHRINK * c[:, active]), LOWEST)
+    return c
