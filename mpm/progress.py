@@ -18,7 +18,7 @@ from rich.text import Text
 
 from mpm.notebook import LiveLine, in_notebook
 from mpm.parallel import is_root
-from mpm.screen import say, screen, spinner
+from mpm.screen import duration, say, screen, spinner
 
 if TYPE_CHECKING:
     from mpm.reactor import Reactor
@@ -142,13 +142,3 @@ class Progress:
                 f"balances to {max(balances, default=0.0):.0e}",
             ]
         )
-
-
-def duration(seconds: float) -> str:
-    """A time to wait, in the two units that matter: `40 s`, `3 min 20 s`, `2 h 5 min`, `3 d 4 h`."""
-    whole = round(seconds)
-    for large, small, size, part in (("d", "h", 86400, 3600), ("h", "min", 3600, 60), ("min", "s", 60, 1)):
-        if whole >= size:
-            rest = whole % size // part
-            return f"{whole // size} {large}" + (f" {rest} {small}" if rest else "")
-    return f"{whole} s"

@@ -133,6 +133,16 @@ def lines_of(text: str, width: int, indent: int = 0, hang: int = 4) -> list[str]
     return [line.replace(HARD_SPACE, " ") for line in lines]
 
 
+def duration(seconds: float) -> str:
+    """A time to wait, in the two units that matter: `40 s`, `3 min 20 s`, `2 h 5 min`, `3 d 4 h`."""
+    whole = round(seconds)
+    for large, small, size, part in (("d", "h", 86400, 3600), ("h", "min", 3600, 60), ("min", "s", 60, 1)):
+        if whole >= size:
+            rest = whole % size // part
+            return f"{whole // size} {large}" + (f" {rest} {small}" if rest else "")
+    return f"{whole} s"
+
+
 class Sheet:
     """Numbers in groups with plain headings: `label   value`, the values of all groups below each other.
 

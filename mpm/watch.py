@@ -17,9 +17,8 @@ from mpm.files import locked, read_text
 from mpm.history import read_table
 from mpm.nextsteps import print_end, print_steps
 from mpm.output import RunDirectory
-from mpm.progress import duration
 from mpm.quantities import quantity
-from mpm.screen import lines_of, say
+from mpm.screen import duration, lines_of, say
 from mpm.tables import print_summary, shown
 
 if TYPE_CHECKING:

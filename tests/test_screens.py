@@ -52,7 +52,7 @@ class Terminal(io.TextIOWrapper):
 def called(arguments: list[str], columns: int | None, monkeypatch: pytest.MonkeyPatch) -> tuple[str, str]:
     """What a verb prints on a terminal of so many `columns`, or into a pipe (None), and what it says meanwhile, into a pipe."""
     stream, other = Terminal(columns is not None), Terminal(False)
-    if arguments[0] == "resume":  # always the same run
+    if arguments[0] == "resume" and arguments[1] != "--help":  # always the same run
         shutil.rmtree(arguments[1], ignore_errors=True)
         shutil.copytree("run", arguments[1])
     elif arguments[0] == "new":  # which writes over nothing

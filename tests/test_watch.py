@@ -1,5 +1,7 @@
 """Following a run from outside: `mpm watch`."""
 
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -96,3 +98,10 @@ def test_what_is_no_run_is_not_watched(tmp_path: Path, capsys: pytest.CaptureFix
     """Fails when a directory without a run is watched for ever."""
     assert main(["watch", str(tmp_path)]) == 2
     assert "nothing to watch" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("module", ["watch", "compare", "kinds", "rundirs"])
+def test_what_only_rank_0_loads_starts_no_mpi(module: str) -> None:
+    """Fails when a verb that one rank alone carries out would wait in MPI's start for the others, for ever."""
+    code = f"import sys, mpm.{module}; sys.exit('mpi4py.MPI' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=120).returncode == 0
