@@ -26,10 +26,12 @@ from mpm.results import Run, fed_species, load_run, made_sites
 from mpm.series import Series
 
 VIEW, VIBRATION = "view.py", "vibration.py"
-TALLEST = 0.4
-"""Height of the drawn strip over its length, at most: two of them fill a window."""
+TALLEST = 0.8
+"""Height over length, at most, of all drawn strips: they fill a window."""
 CROWDED = 2.5
 """Ratio of two numbers on a logarithmic bar that leaves room for both."""
+MOST = 6.5
+"""Steps between the ends of a linear bar, at most."""
 NUMBERED = ("zone", "layer")
 PRESETS = {"viridis": "Viridis (matplotlib)", "cividis": "Cividis", "PuOr_r": "PuOr"}
 """ParaView's names of matplotlib's colour maps."""
@@ -75,8 +77,11 @@ def _write(run: Run, series: Series, name: str, panels: Sequence[str], say: Call
     path = run.directory.path / name
     write_atomically(path, script(run, series, name, shown, ranges))
     words = " and ".join(field_name(panel).label for panel in shown)
-    of = "over time" if name == VIEW else f"phase by phase ({len(series.steps)})"
-    return Script(path, printable(f"{'The run' if name == VIEW else 'The vibration'} {of}, {words}"))
+    if name == VIBRATION:
+        what = f"The vibration in {len(series.steps)} phases"
+    else:
+        what = "The steady state" if run.case.fidelity == "steady" else "The run over time"
+    return Script(path, printable(f"{what}: {words}"))
 
 
 def ranges_over_time(series: Series, say: Callable[[str], None]) -> dict[str, tuple[float, float]]:
@@ -116,11 +121,15 @@ def colours(name: str, low: float, high: float) -> dict[str, Any]:
 
 
 def bar_labels(low: float, high: float, log: bool) -> list[float]:
-    """Numbers at a colour bar: its ends, and between them decades or fifths that do not crowd them."""
-    if not log:
-        return [low + (high - low) * part / 5.0 for part in range(6)]
-    decades = [10.0**k for k in range(math.ceil(math.log10(low)), math.floor(math.log10(high)) + 1)]
-    return [low, *(d for d in decades if CROWDED * low < d < high / CROWDED), high]
+    """Numbers at a colour bar: its ends, and between them decades or round steps that do not crowd them."""
+    if log:
+        decades = [10.0**k for k in range(math.ceil(math.log10(low)), math.floor(math.log10(high)) + 1)]
+        return [low, *(d for d in decades if CROWDED * low < d < high / CROWDED), high]
+    coarse = 10.0 ** math.floor(math.log10(high - low))
+    steps = (part * coarse for part in (0.1, 0.2, 0.5, 1.0, 2.0))
+    step = next(step for step in steps if high - low <= MOST * step)
+    places = range(math.ceil(low / step), math.floor(high / step) + 1)
+    return [low, *(k * step for k in places if low + 0.5 * step < k * step < high - 0.5 * step), high]
 
 
 def shortened(text: str, longest: int = 60) -> str:
@@ -128,9 +137,9 @@ def shortened(text: str, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-def vertical_scale(length: float, height: float) -> int:
-    """How many times higher than it is a strip is drawn, so that its layers can be told apart."""
-    return max(1, int(TALLEST * length / height))
+def vertical_scale(length: float, height: float, panels: int) -> int:
+    """How many times higher than it is a strip is drawn, so that its layers can be told apart, in each of so many pictures of it."""
+    return max(1, int(TALLEST / panels * length / height))
 
 
 def script(
@@ -139,7 +148,7 @@ def script(
     """The text of a script."""
     grid, motion = run.grid, run.case.motion
     times = [time for time, _ in series.steps]
-    high = vertical_scale(float(grid.x[-1] - grid.x[0]), float(grid.y[-1] - grid.y[0]))
+    high = vertical_scale(float(grid.x[-1] - grid.x[0]), float(grid.y[-1] - grid.y[0]), len(panels))
     label = "'t = %.4g s' % time_value"
     if name == VIBRATION:
         phase = f"(time_value - {motion.start!r}) * {360.0 * motion.frequency!r} % 360.0"

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shlex
 import shutil
 import subprocess
 from pathlib import Path
@@ -71,7 +72,8 @@ def test_script_holds_what_the_files_hold(name: str, run: Path) -> None:
                 entry["high"] == pytest.approx(values.max()) and entry["low"] >= 0.99e-4 * values.max() > 0.0
             )
         elif spread and values.min() >= 0.0:
-            assert (entry["low"], entry["high"]) == pytest.approx((values.min(), values.max()))
+            low = 0.0 if values.min() < 0.1 * values.max() else values.min()  # as in every picture
+            assert (entry["low"], entry["high"]) == pytest.approx((low, values.max()))
         assert entry["low"] < entry["high"]
         assert entry["labels"][0] == entry["low"] and entry["labels"][-1] == pytest.approx(entry["high"])
     assert said["TITLE"] == TITLE
@@ -125,8 +127,12 @@ def test_what_is_missing_or_damaged(run: Path, tmp_path: Path, capsys: pytest.Ca
 
 def test_scale_and_numbers_of_a_bar() -> None:
     """Fails when a strip is drawn flatter than it is or out of the window, or numbers at a bar crowd each other."""
-    assert [vertical_scale(length, 0.02) for length in (0.001, 0.02, 0.14, 2.0)] == [1, 1, 2, 40]
+    assert [vertical_scale(length, 0.02, 2) for length in (0.001, 0.02, 0.14, 2.0)] == [1, 1, 2, 40]
+    assert vertical_scale(0.14, 0.02, 1) == 5
     assert bar_labels(0.0, 1.0, False) == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    assert bar_labels(0.0, 0.0655, False) == pytest.approx([0.0, 0.02, 0.04, 0.0655])
+    assert bar_labels(0.0, 0.04, False) == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.04])
+    assert bar_labels(-3.0, 57.0, False) == pytest.approx([-3.0, 10.0, 20.0, 30.0, 40.0, 50.0, 57.0])
     assert bar_labels(9e-9, 9e-5, True) == pytest.approx([9e-9, 1e-7, 1e-6, 1e-5, 9e-5])
     assert bar_labels(1e-8, 1e-4, True) == pytest.approx([1e-8, 1e-7, 1e-6, 1e-5, 1e-4])
 
@@ -134,26 +140,29 @@ def test_scale_and_numbers_of_a_bar() -> None:
 @pytest.mark.skipif(
     shutil.which("pvbatch") is None or shutil.which("xvfb-run") is None, reason="ParaView is not installed"
 )
-@pytest.mark.parametrize("name", [VIEW, VIBRATION])
-def test_paraview_draws_it(name: str, run: Path, tmp_path: Path) -> None:
+def test_paraview_draws_them(run: Path, tmp_path: Path) -> None:
     """Fails when ParaView stumbles over a script, or shows a strip in one colour."""
-    script = next(script for script in write_scripts(run, pytest.fail) if script.path.name == name)
-    picture, batch = tmp_path / "picture.png", tmp_path / "batch.py"
-    batch.write_text(
-        f"path = {str(script.path)!r}\nexec(compile(open(path).read(), path, 'exec'), {{'__file__': path}})\n"
-        f"pv.SaveScreenshot({str(picture)!r}, pv.GetLayout(), ImageResolution=[800, 500])\n".replace(
-            "pv.", "simple."
-        ).replace("path = ", "from paraview import simple\npath = ", 1)
-    )
+    scripts, batches = write_scripts(run, pytest.fail), []
+    for script in scripts:
+        path, picture = str(script.path), str(tmp_path / f"{script.path.stem}.png")
+        batches.append(tmp_path / f"draw_{script.path.name}")
+        batches[-1].write_text(
+            f"path = {path!r}\nexec(compile(open(path).read(), path, 'exec'), {{'__file__': path}})\n"
+            "from paraview import simple\n"
+            f"simple.SaveScreenshot({picture!r}, simple.GetLayout(), ImageResolution=[800, 500])\n"
+        )
+    calls = " && ".join(shlex.join(["pvbatch", str(batch)]) for batch in batches)
     done = subprocess.run(
-        ["xvfb-run", "-a", "pvbatch", str(batch)],
+        ["xvfb-run", "-a", "sh", "-c", calls],
         capture_output=True,
         text=True,
-        timeout=120,
-        check=True,
+        timeout=180,
         env={k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VTK"))},
     )
-    assert "Error" not in done.stderr and "Failed" not in done.stderr, done.stderr
-    image = mpimg.imread(picture)[..., :3]
-    coloured = np.ptp(image, axis=2) > 0.15  # neither the white around it nor the grey of its edges
-    assert len(np.unique((image[coloured] * 20).astype(int), axis=0)) > 20
+    if "bad X server connection" in done.stderr:
+        pytest.skip("no X server came up for ParaView")
+    assert done.returncode == 0 and "Error" not in done.stderr and "Failed" not in done.stderr, done.stderr
+    for script in scripts:
+        image = mpimg.imread(tmp_path / f"{script.path.stem}.png")[..., :3]
+        coloured = np.ptp(image, axis=2) > 0.15  # neither the white around it nor the grey of its edges
+        assert len(np.unique((image[coloured] * 20).astype(int), axis=0)) > 20

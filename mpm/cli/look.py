@@ -155,5 +155,5 @@ def paraview(
         raise typer.Exit(open_script(scripts, vibration))
     console = screen()
     for script in scripts:
-        say(console, f"{script.shows}:")
+        say(console, script.shows)
         print(f"    {script.typed}")
