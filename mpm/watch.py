@@ -66,21 +66,24 @@ def look(path: Path) -> Look:
     return Look(told[-1] if told else "starting", max(age, 0.0), rows[-1] if rows else {})
 
 
-def watch_run(path: Path, once: bool, console: Console) -> int:
-    """Follow the run in `path` to its end and say how it ended; returns its exit status. `once`: say how it is now, and no more."""
+def watch_run(path: Path, once: bool, console: Console) -> None:
+    """Follow the run in `path` to its end and say how it ended. `once`: say how it is now, and no more.
+
+    Raises ConvergenceError when the run has failed, Interrupted when it was stopped.
+    """
     if locked(RunDirectory(path).log):
         if once:
             for line in look(path).text():
                 say(console, line)
-            return 0
+            return
         try:
             _follow(path, console)
         except KeyboardInterrupt:
             say(console, f"no longer watching; the run in {path} goes on")
-            return 0
+            return
     else:
         say(console, f"no run is at work in {path}")
-    return _tell_end(path, console)
+    _tell_end(path, console)
 
 
 def _follow(path: Path, console: Console) -> None:
@@ -112,22 +115,20 @@ def _wait(log: Path, seconds: float) -> None:
         time.sleep(min(0.2, seconds))
 
 
-def _tell_end(path: Path, console: Console) -> int:
-    """How the last run ended, its numbers, and what to type next; returns its exit status."""
+def _tell_end(path: Path, console: Console) -> None:
+    """How the last run ended, its numbers, and what to type next. Raises ConvergenceError or Interrupted as that run did."""
     case, summary = load_case(path / "case.toml"), RunDirectory(path).read_summary()
-    name = shlex.quote(str(path))
-    go_on = [(f"mpm resume {name}", "go on"), (f"mpm plot {name}", "pictures of what there is")]
-    if summary is None:
-        say(console, f"{path}: the run was ended from outside; the last word of its log: {look(path).line}")
-        print_steps(go_on, console)
-        return Interrupted.exit_status
-    if summary.get("status") == "done":
+    last, name = look(path).line, shlex.quote(str(path))
+    if summary is not None and summary.get("status") == "done":
         say(console, f"{path}: the run is done")
         print_end(case, summary, path, console, (path / "report.html").exists())
-        return 0
-    print_summary(summary, console)
-    console.print()
-    failed = summary.get("status") == "failed"
-    say(console, f"{path}: the run {'has failed' if failed else 'was interrupted'}: {look(path).line}")
-    print_steps(go_on, console)
-    return ConvergenceError.exit_status if failed else Interrupted.exit_status
+        return
+    if summary is not None:
+        print_summary(summary, console)
+        console.print()
+    print_steps([(f"mpm resume {name}", "go on"), (f"mpm plot {name}", "pictures of what there is")], console)
+    if summary is None:
+        raise Interrupted(f"{path}: the run was ended from outside; the last word of its log: {last}")
+    if summary.get("status") == "failed":
+        raise ConvergenceError(f"{path}: the run has failed: {last}")
+    raise Interrupted(f"{path}: the run was interrupted: {last}")

@@ -77,7 +77,7 @@ def test_watching_ends_with_the_run(
                 log.write(f"2026-01-02 03:04:05,678 {words}\n")
             deadline = time.monotonic() + 30.0
             while words not in "".join(told) and time.monotonic() < deadline:
-                told.append(capsys.readouterr().out)
+                told.append(capsys.readouterr().out)  # nothing goes to standard error before the end
                 time.sleep(0.02)
         if summary is not None:
             run.write_summary(summary)
@@ -87,9 +87,10 @@ def test_watching_ends_with_the_run(
     other.start()
     ended = main(["watch", str(run.path)])
     other.join()
-    text = "".join(told) + capsys.readouterr().out
-    assert ended == status
-    order = [text.index(words) for words in ("first words", "second words", "Newton stopped", says)]
+    out, err = capsys.readouterr()
+    text = "".join(told) + out
+    assert ended == status and says in err and len(err.splitlines()) == 1
+    order = [text.index(words) for words in ("first words", "second words", "Newton stopped")]
     assert order == sorted(order)
     assert f"mpm resume {run.path}" in text
 

@@ -16,8 +16,9 @@ app = App(
     context_settings=HELP_NAMES,
     help="""Moving porous media: vibrating powder reactors for atomic layer deposition.
 
-    mpm check single_zone        what an engineer asks first about a case
-    mpm run single_zone          compute it
+    mpm new my.toml              a commented case to edit; mpm list: what is built in
+    mpm check my.toml            what an engineer asks first about it
+    mpm run my.toml              compute it, into results/my
     mpm help run                 a verb in full, with examples (or: mpm run -h)
     """,
     pretty_exceptions_enable=False,

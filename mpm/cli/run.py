@@ -116,7 +116,7 @@ def watch(
     if rank() == 0:
         from mpm.watch import watch_run
 
-        raise typer.Exit(watch_run(directory, once, screen()))
+        watch_run(directory, once, screen())
 
 
 def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: bool) -> dict[str, Any]:
