@@ -65,7 +65,7 @@ def test_last_cycle_is_written_phase_by_phase(tmp_path: Path) -> None:
     if COMM.rank != 0:
         return
     alone = Reactor(case.with_({"output.phases": 0}), MPI.COMM_SELF).run(output=tmp_path / "without")
-    assert_same_numbers(result.summary, alone.summary, 1e-8)
+    assert_same_numbers(result.summary, alone.summary, 0.0 if COMM.size == 1 else 1e-8)
     assert not (tmp_path / "without" / "phases.pvd").exists()
     found, grid = phases(tmp_path / "all"), Grid.from_case(case)
     times = np.array([snapshot.time for snapshot in found])
