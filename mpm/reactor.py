@@ -27,80 +27,27 @@ from mpm.geometry import Grid
 from mpm.history import Row, columns_of
 from mpm.keys import values
 from mpm.motion import BedMotion, step_motion
-from mpm.notebook import result_html
 from mpm.output import RunDirectory
 from mpm.parallel import is_root, largest, on_root, total
 from mpm.phases import LastCycle, phase_fields
 from mpm.progress import FLOW, Progress, log_file
 from mpm.replay import March, Replay
-from mpm.results import LastInstant, Run, load_run
+from mpm.result import Result as Result
 from mpm.schedule import Schedule, Step
 from mpm.signals import stop_signals
 from mpm.steady import steady_problem
 from mpm.strip import Strip
 from mpm.summary import history_row, summarise
 from mpm.transport import Transport
-from mpm.verdict import verdict
 
 from mpi4py import MPI  # isort: skip  (after fem)
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from mpm.case import Case
 
 Floats = NDArray[np.float64]
 log = logging.getLogger("mpm")
 Callback = Callable[["Reactor"], None]
-
-
-class Result:
-    """What a run gives: `summary` (as summary.json), `history` (columns of history.csv), and fields of the last instant."""
-
-    def __init__(self, reactor: Reactor, summary: dict[str, Any], directory: Path | None):
-        self.summary, self.directory = summary, directory
-        self.case, self.time = reactor.case, reactor.time
-        self.history = reactor.history()
-        self.fields = reactor.fields
-        self.field = reactor.field
-        self.coverage = reactor.coverage
-        self.grid = reactor.grid
-        self._comm = reactor.comm
-
-    def plot(self, name: str | None = None, **options: Any) -> Figure:
-        """A picture as `mpm.load_run(directory).plot(name)` draws it; of a run without a directory the fields are those of its end.
-
-        On one process. Raises InputError for a name that is not there, with the nearest.
-        """
-        return self._run().plot(name, **options)
-
-    def _run(self) -> Run:
-        """This run as its directory holds it, or without one its last instant."""
-        if self.directory is not None:
-            return load_run(self.directory)
-        if self._comm.size > 1:
-            raise InputError(
-                "plot: a run without a directory on several processes; accepted: run(output=...)"
-            )
-        return LastInstant.of(self.case, self.grid, self.history, self.summary, self.fields(), self.time)
-
-    def __repr__(self) -> str:
-        return f"Result: {verdict(self.case, self.summary)}"
-
-    def _repr_html_(self) -> str:
-        return result_html(self.case, self.summary, "" if self.directory is None else str(self.directory))
-
-    def report(self, output: str | Path | None = None) -> Path:
-        """Write one page with everything about this run (`mpm report`), by default `report.html` of its directory; returns its path.
-
-        Collective; rank 0 writes. Raises InputError for a run that has not written its results (`run(output=...)`).
-        """
-        directory = self.directory
-        if directory is None:
-            raise InputError("report: this run has no directory; accepted: a result of run(output=...)")
-        from mpm.page import report
-
-        return on_root(self._comm, lambda: report(directory, output))
 
 
 class Reactor:
