@@ -56,7 +56,8 @@ class Check(Mapping[str, Any]):
         return page.getvalue().rstrip()
 
     def _repr_html_(self) -> str:
-        from mpm.checkscreen import Marked, case_sheet
+        from mpm.checkscreen import case_sheet
+        from mpm.marks import Marked
         from mpm.sketch import sketch
 
         parts = [notebook.paragraph(self.case.title or "case", bold=True)]

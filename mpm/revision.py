@@ -11,7 +11,17 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent
 WITHOUT_NUMBERS = (
     *("sweep", "dem", "cases", "cli", "page"),
-    *("launcher.py", "settings.py", "screen.py", "tables.py", "checkscreen.py", "sketch.py", "nextsteps.py"),
+    *(
+        "launcher.py",
+        "settings.py",
+        "screen.py",
+        "tables.py",
+        "checkscreen.py",
+        "marks.py",
+        "notes.py",
+        "sketch.py",
+        "nextsteps.py",
+    ),
     *("caveats.py", "idle.py", "quantities.py", "keys.py", "schema.py", "verdict.py", "compare.py"),
     *("results.py", "pictures.py", "maps.py", "outline.py", "curves.py", "labels.py", "fieldnames.py"),
     *("drawing.py", "beside.py", "movie.py"),

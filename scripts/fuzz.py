@@ -30,9 +30,10 @@ from rich.console import Console
 from mpm.case import load_case
 from mpm.caseio import built_in_files
 from mpm.checks import check_case
-from mpm.checkscreen import print_full, print_report
+from mpm.checkscreen import print_report
 from mpm.dem.case import load_case as load_powder
 from mpm.errors import InputError
+from mpm.marks import print_full
 from mpm.sweep.plan import combinations, plan
 from mpm.sweep.sweepfile import read_sweep
 from mpm.tables import print_mesh

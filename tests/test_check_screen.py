@@ -10,8 +10,9 @@ import pytest
 
 from mpm.case import Case, load_case
 from mpm.checks import check_case
-from mpm.checkscreen import print_full, print_report
+from mpm.checkscreen import print_report
 from mpm.cli import main
+from mpm.marks import print_full
 from mpm.nextsteps import print_steps
 from mpm.notes import notes, sites_per_square_nanometre, standard_flow
 

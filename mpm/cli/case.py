@@ -73,7 +73,8 @@ def check(
 
         print(json.dumps({**report, "case": loaded.to_dict()}, indent=2, allow_nan=False))
         return
-    from mpm.checkscreen import print_full, print_report
+    from mpm.checkscreen import print_report
+    from mpm.marks import print_full
     from mpm.nextsteps import print_steps
 
     if full:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from mpm.checks import check_case
-from mpm.checkscreen import MARKS, Marked, case_sheet
+from mpm.checkscreen import case_sheet
 from mpm.fieldnames import field_name
 from mpm.keys import values
+from mpm.marks import MARKS, Marked
 from mpm.page.curves import Chart, curves
 from mpm.page.fields import (
     FEWEST_TIMES,
