@@ -259,7 +259,7 @@ def test_points_of_a_sweep_open_their_runs(sweep: Path, browser: Any) -> None:
 
 def test_defaults_are_marked_and_warnings_are_there(zone: Path) -> None:
     """Fails when a value that nobody typed looks typed, or a warning of check is missing from the page."""
-    page = run_page(zone, fields=False)
+    page = run_page(zone, budget=0)
     origins = {one.key: one.origin for _, rows in page.inputs for one in rows}
     assert origins["geometry.inlet.tma.mass_fractions.TMA"] == "typed"
     assert (origins["geometry.periodic"], origins["motion.startup"]) == ("base", "default")
@@ -273,7 +273,7 @@ def test_defaults_are_marked_and_warnings_are_there(zone: Path) -> None:
 
 def test_the_sheet_adds_up(cycle: Path) -> None:
     """Fails when the shares of a species that comes and goes do not sum to what came."""
-    for account in run_page(cycle, fields=False).accounts:
+    for account in run_page(cycle, budget=0).accounts:
         terms = {row.name.split(".")[-1]: row.value for row in account.rows}
         came = terms["fed"] + terms["produced"]
         assert came == pytest.approx(terms["reacted"] + terms["left"] + terms["stored"], rel=1e-9)
@@ -317,11 +317,9 @@ def test_joined_cells_keep_the_layers() -> None:
     assert chosen_times(10, 4) == [0, 3, 6, 9] and chosen_times(0, 4) == []
 
 
-def test_a_large_run_is_joined_and_says_so(zone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_run_is_joined_and_says_so(zone: Path) -> None:
     """Fails when a page grows with its run instead of staying within its budget."""
-    monkeypatch.setattr("mpm.page.run_page.BUDGET", 6_000)
-    monkeypatch.setattr("mpm.page.run_page.viewer.__defaults__", (None, 6_000))
-    page = run_page(zone)
+    page = run_page(zone, budget=6_000)
     assert page.viewer is not None and page.viewer["joined"] > 1
     assert "are joined to one here" in page.note
 
@@ -357,3 +355,40 @@ def test_a_result_writes_its_page(tmp_path: Path) -> None:
     assert result.report() == tmp_path / "run" / "report.html"
     with pytest.raises(InputError, match="no directory"):
         Reactor(case).run().report()
+
+
+DAMAGE: dict[str, tuple[str, bytes | None, str]] = {
+    "no summary": ("summary.json", None, ""),
+    "cut summary": ("summary.json", b'{"status": "do', "summary.json: not readable"),
+    "no fields": ("fields/fields_000001.vtu", None, "fields_000001.vtu: No such file"),
+    "cut fields": ("fields/fields_000000.vtu", b"<VTKFile", "not a whole .vtu"),
+    "cut flux": ("flux.csv", b"x,velocity_y.bed\n0.1,2.0\n0.2,", "flux.csv: not a table of mpm"),
+    "foreign flux": ("flux.csv", b"x,velocity_y.bed\n0.1,nan\n0.2,3\n", "flux.csv: not a table of mpm"),
+    "foreign origin": ("origin.json", b"[1]", "origin.json: found a list"),
+    "empty history": ("history.csv", b"", "history.csv: not a history"),
+}
+
+
+@pytest.mark.parametrize("which", DAMAGE)
+def test_what_is_damaged_is_named_and_left_out(which: str, zone: Path, tmp_path: Path) -> None:
+    """Fails when a missing or damaged file stops the page, is passed over in silence, or takes more than a line."""
+    name, content, words = DAMAGE[which]
+    shutil.copytree(zone, tmp_path / "run")
+    file = tmp_path / "run" / name
+    file.unlink()
+    if content is not None:
+        file.write_bytes(content)
+    said: list[str] = []
+    html = report(tmp_path / "run", say=said.append).read_text()
+    assert len(said) == (1 if words else 0) and words in "".join(said)
+    assert ("This run has not reported its numbers yet" in html) == (name == "summary.json")
+
+
+def test_a_run_without_any_whole_fields_has_a_page(zone: Path, tmp_path: Path) -> None:
+    """Fails when the loss of all fields costs the numbers too, or every one of them is complained of."""
+    shutil.copytree(zone, tmp_path / "run")
+    shutil.rmtree(tmp_path / "run" / "fields")
+    said: list[str] = []
+    page = run_page(tmp_path / "run", said.append)
+    assert page.viewer is None and page.groups
+    assert len(said) == 1 and "and 4 more of 5 stored times" in said[0]

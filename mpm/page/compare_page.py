@@ -13,7 +13,8 @@ from mpm.errors import InputError
 from mpm.fieldnames import superscript
 from mpm.page.fields import DECADES, read_film, value_range
 from mpm.page.numbers import rounded
-from mpm.page.run_page import BUDGET, VALUES, RunPage, looks, run_page, viewer
+from mpm.page.run_page import RunPage, run_page
+from mpm.page.viewer import BUDGET, VALUES, looks, viewer
 from mpm.page.write import render
 from mpm.quantities import Quantity, flatten
 from mpm.results import Run
@@ -57,16 +58,16 @@ def compare_page(
             f"{len(directories)} runs",
             f"at most {MOST_RUNS} side by side, or the directory of a sweep",
         )
-    pages = [run_page(directory, say, fields=False) for directory in directories]
+    pages = [run_page(directory, say, budget=0) for directory in directories]
     runs = [page.run for page in pages]
     bounds = shared_bounds(runs)
-    films = [viewer(run, bounds, BUDGET // len(runs)) for run in runs if run.times]
+    films = [viewer(run, BUDGET // len(runs), bounds, say) for run in runs]
     return ComparePage(
         runs=pages,
         names=told_apart([page.run.directory.path.resolve() for page in pages]),
         keys=key_table(runs),
         numbers=number_table(runs),
-        films=[one for one in films if one is not None] if len(films) == len(runs) else [],
+        films=[] if None in films else [one for one in films if one is not None],
     )
 
 

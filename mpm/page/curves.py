@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpm.case import Case
+from mpm.errors import InputError
+from mpm.files import read_text
 from mpm.outline import OKABE_ITO
 from mpm.quantities import quantity
 from mpm.results import Run
@@ -63,11 +67,14 @@ def trace(x: Any, y: Any, name: str, colour: int = 0, dash: int = 0, **more: Any
     }
 
 
-def curves(run: Run) -> list[Chart]:
-    """Everything of a run that is a curve, over time and along the strip."""
-    found: Iterable[Chart | None] = (
-        coating(run), outlets(run), growth(run), exit_profiles(run), flux(run)
-    )  # fmt: skip
+def curves(run: Run, say: Callable[[str], None] = lambda text: None) -> list[Chart]:
+    """Everything of a run that is a curve, over time and along the strip; a damaged flux.csv is named to `say` and left out."""
+    try:
+        rising = flux(run)
+    except (InputError, OSError) as error:
+        say(str(error))
+        rising = None
+    found = (coating(run), outlets(run), growth(run), exit_profiles(run), rising)
     return [one for one in found if one is not None]
 
 
@@ -167,31 +174,38 @@ def _conveyed_rows(case: Case, run: Run) -> slice | None:
     return None if name is None else run.grid.layer_rows(name)
 
 
+def read_flux(path: Path) -> dict[str, NDArray[np.float64]]:
+    """The columns of flux.csv, `x` [m] first. Raises InputError for another table."""
+    try:
+        text = read_text(path)
+        if not text.endswith("\n"):
+            raise ValueError("its last line is not whole")
+        names, *rows = csv.reader(text.splitlines())
+        columns = dict(zip(names, np.array(rows, float).T, strict=True))
+    except ValueError as error:
+        raise InputError(f"{path}: not a table of mpm ({error})") from error
+    if "x" not in columns or not all(np.isfinite(values).all() for values in columns.values()):
+        raise InputError(f"{path}: not a table of mpm; accepted: finite numbers, a column x")
+    return columns
+
+
 def flux(run: Run) -> Chart | None:
-    """Gas velocity through the upper face of every layer along x, from flux.csv."""
+    """Gas velocity through the upper face of every layer along x, from flux.csv. Raises InputError when that is damaged."""
     path = run.directory.path / "flux.csv"
     if not path.is_file():
         return None
-    with path.open(encoding="utf-8") as file:
-        rows = list(csv.reader(file))
-    if len(rows) < 3:
-        return None
-    columns = dict(zip(rows[0], np.array(rows[1:], float).T, strict=True))
+    columns = read_flux(path)
     x = columns.pop("x")
-    faces = [layer.name for layer in run.case.geometry.layers]
-    traces = [
-        trace(x * MM, values * 100.0, f"top of {name.removeprefix('velocity_y.')}", index)
-        for index, (name, values) in enumerate(columns.items())
-        if name.removeprefix("velocity_y.") in faces
-    ]
-    if not traces:
+    faces = {f"velocity_y.{layer.name}": layer.name for layer in run.case.geometry.layers}
+    shown = {faces[name]: 100.0 * values for name, values in columns.items() if name in faces}
+    if not shown or len(x) < 2:
         return None
-    largest = 100.0 * max(float(np.abs(values).max()) for values in columns.values())
-    lowest = 100.0 * min(float(values.min()) for values in columns.values())
-    ends = (
-        min(0.0, 1.05 * lowest),
-        1.05 * largest or 1.0,
-    )  # from zero: rounding must not look like a profile
+    traces = [
+        trace(x * MM, values, f"top of {name}", index) for index, (name, values) in enumerate(shown.items())
+    ]
+    lowest = min(0.0, *(float(values.min()) for values in shown.values()))
+    highest = max(0.0, *(float(values.max()) for values in shown.values()))
+    ends = (1.05 * lowest, 1.05 * highest or 1.0)  # from zero: rounding must not look like a profile
     return chart(
         "Gas rising through the faces of the layers",
         "x [mm]",

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.errors import InputError
 from mpm.results import Run
 from mpm.vtu import Snapshot
 
@@ -145,10 +146,13 @@ def chosen_times(count: int, most: int) -> list[int]:
     return list(range((count - 1) % step, count, step)) if count else []
 
 
-def read_film(run: Run, wanted: Mapping[str, Maker], values: int) -> Film:
+def read_film(
+    run: Run, wanted: Mapping[str, Maker], values: int, say: Callable[[str], None] = lambda text: None
+) -> Film:
     """Read the stored fields of a run, of each at most about `values` numbers: evenly chosen times, then joined cells.
 
-    `wanted` makes of each snapshot an array of cells (rows, columns) or of corners (one more each).
+    `wanted` makes of each snapshot an array of cells (rows, columns) or of corners (one more each). Times whose file is missing or damaged
+    are left out, which one line to `say` tells.
     """
     grid = run.grid
     cells = grid.cells
@@ -161,22 +165,23 @@ def read_film(run: Run, wanted: Mapping[str, Maker], values: int) -> Film:
         joined_edges(grid.y, grid.row_layer, joined),
         joined_edges(grid.x, np.zeros(grid.columns), joined),
     )
+    times, lost = [], []
     for index in indices:
-        snapshot = run.snapshot(index)
-        for name, make in wanted.items():
-            series[name].append(
-                _joined(make(run, snapshot), grid.x, grid.y, rows, columns).astype(np.float32)
-            )
+        try:
+            snapshot = run.snapshot(index)
+            made = [make(run, snapshot) for make in wanted.values()]
+        except InputError as error:
+            lost.append(str(error))
+            continue
+        times.append(run.times[index])
+        for name, field in zip(wanted, made, strict=True):
+            series[name].append(_joined(field, grid.x, grid.y, rows, columns).astype(np.float32))
+    if lost:
+        others = f", and {len(lost) - 1} more of {len(indices)} stored times" if len(lost) > 1 else ""
+        say(f"{lost[0]}{others}: left out of the page")
     every = indices[1] - indices[0] if len(indices) > 1 else 1
-    return Film(
-        grid.x[columns],
-        grid.y[rows],
-        grid.row_layer[rows[:-1]],
-        tuple(run.times[i] for i in indices),
-        series,
-        every,
-        joined,
-    )
+    layer = grid.row_layer[rows[:-1]]
+    return Film(grid.x[columns], grid.y[rows], layer, tuple(times), series, every, joined)
 
 
 def fewer_times(film: Film) -> Film:
