@@ -231,7 +231,8 @@ def test_places_that_may_not_be_written(tmp_path: Path) -> None:
     )
     for path in (Path(out), *Path(out).rglob("*")):
         path.chmod(0o555 if path.is_dir() else 0o444)
-    refused("cannot be used as output directory", "run", str(file), "-o", out, "-q", "--resume", **cache)
+    refused("nothing to resume", "run", str(file), "-o", out, "-q", "--resume", **cache)  # needs no writing
+    refused("cannot be used as output directory", "resume", out, "--end", "28 ms", "-q", **cache)
     refused("Permission denied", "plot", out, **{**cache, "MPLCONFIGDIR": ""})
 
 
