@@ -48,6 +48,7 @@ def steps_of_the_readme() -> list[tuple[str, str]]:
     return [("command", match[3]) if match[3] else (match[1], match[2]) for match in found]
 
 
+@pytest.mark.slow
 def test_steps_of_the_readme_work_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], mpirun: Any
 ) -> None:
