@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -117,13 +118,16 @@ def natural_scale(name: str, numbers: dict[str, float]) -> float:
 
     Amounts [mol/m]: the largest feed of a species. Rates per volume: that feed per second, spread over a square metre of strip (none is as
     large). Growth per surface and thickness: 1 umol/m2, 1 nm. Flows, velocities and pressure drops of the gas: the largest of their kind.
-    Shares, coverages and mole fractions: 1. Lengths: 1 m.
+    Shares, coverages and mole fractions: 1; shares of a CVD that is itself 0 mean nothing. Lengths: 1 m.
     """
     kind, last = name.split(".")[0], name.split(".")[-1]
     feed = max((value for key, value in numbers.items() if _is_feed(key)), default=0.0)
     if kind == "cvd" and last.startswith("rate"):
         return feed / max(numbers.get("simulated_seconds", 1.0), 1.0)
-    if kind in ("species", "film", "cvd") and "share_in_zone" not in name:
+    if kind == "cvd" and "share_in_zone" in name:
+        rate = numbers.get("cvd.rate_mean", 0.0)
+        return math.inf if rate <= ROUNDING * natural_scale("cvd.rate_mean", numbers) else 1.0
+    if kind in ("species", "film", "cvd"):
         return {"per_area": 1e-6, "thickness": 1e-9}.get(last, feed)
     if kind == "flow":
         unit = quantity(name).unit

@@ -3,7 +3,8 @@
 import csv
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,15 @@ import pytest
 from mpm import InputError, Reactor, load_case, load_run
 from mpm.cli import main
 from mpm.page import report
+from mpm.page.compare_page import compare_page
 from mpm.page.curves import curves
 from mpm.page.fields import DECADES, LEVELS, Look, chosen_times, encode, joined_edges, levels, value_of
+from mpm.page.numbers import accounts, groups
 from mpm.page.run_page import run_page
-from mpm.page.strip import drawing
+from mpm.page.strip import LETTER, drawing
+from mpm.page.sweep_page import sweep_page
 from mpm.quantities import flatten
+from mpm.verdict import verdict
 from tests.cases import COARSE, SHORT, TINY
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -392,3 +397,121 @@ def test_a_run_without_any_whole_fields_has_a_page(zone: Path, tmp_path: Path) -
     page = run_page(tmp_path / "run", said.append)
     assert page.viewer is None and page.groups
     assert len(said) == 1 and "and 4 more of 5 stored times" in said[0]
+
+
+def sweep_folder(tmp_path: Path, rows: Sequence[Sequence[object]]) -> Path:
+    """The files of a sweep without runs: dose, bed speed, mean coverage at the exit, status, error of each point."""
+    names = ("geometry.inlet.tma.mass_fractions.TMA", "motion.bed_velocity")
+    number = "titration.tma.exit_mean"
+    axes = [
+        {"name": name, "keys": [name], "kind": "number", "written_unit": unit, "logarithmic": False}
+        for name, unit in zip(names, ("", "cm/s"), strict=True)
+    ]
+    about = {
+        "case": "single_zone",
+        "mode": "grid",
+        "axes": axes,
+        "columns": [*names, number],
+        "program": "",
+        "text": "",
+    }
+    (tmp_path / "sweep.json").write_text(json.dumps(about))
+    with (tmp_path / "results.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("point", *names, number, "status", "error"))
+        writer.writerows((f"p{i}", *row) for i, row in enumerate(rows))
+    return tmp_path
+
+
+def test_rounding_is_no_result_of_a_sweep(tmp_path: Path) -> None:
+    """Fails when the page of a sweep draws coverages of 1e-16, or forgets what a point without a result says."""
+    rows = [
+        (1e-4, 0.01, 4e-16, "done", ""),
+        (2e-4, 0.01, 1e-17, "done", ""),
+        (2e-4, 0.02, "", "failed", "diverged <b>"),
+    ]
+    folder = sweep_folder(tmp_path, rows)
+    page = sweep_page(folder)
+    assert [column.values for column in page.columns] == [[0.0, 0.0, None]]
+    assert page.counts == "3 points: 2 done, 1 failed"
+    assert "failed: diverged &lt;b&gt;" in report(folder).read_text()
+
+
+def test_a_sweep_of_one_point_shows_its_numbers(tmp_path: Path) -> None:
+    """Fails when nothing is shown because nothing varies."""
+    page = sweep_page(sweep_folder(tmp_path, [(1e-4, 0.01, 0.5, "done", "")]))
+    assert page.counts == "1 point: 1 done" and [column.values for column in page.columns] == [[0.5]]
+
+
+def test_a_run_without_a_field_does_not_widen_the_range_of_the_others(zone: Path, tmp_path: Path) -> None:
+    """Fails when a run that is fed nothing stretches the colour range to 1, or its zero is taken for a missing field."""
+    changes = {**COARSE, **SHORT, "geometry.inlet.tma.mass_fractions.TMA": 0.0}
+    Reactor(load_case("single_zone", changes)).run(tmp_path / "none")
+    page = compare_page([zone, tmp_path / "none"])
+    ranges = [
+        {f["name"]: (f["low"], f["high"]) for f in film["fields"] if f["name"] != "streams"}
+        for film in page.films
+    ]
+    run = load_run(zone)
+    largest = max(run.field(run.snapshot(i), "x_TMA").max() for i in range(len(run.times)))
+    assert ranges[0]["x_TMA"] == ranges[1]["x_TMA"] == pytest.approx((largest * 10.0**-DECADES, largest))
+
+
+def test_rounding_is_no_amount_of_a_species() -> None:
+    """Fails when a species of 1e-34 mol/m beside a feed of 1e-7 is printed with digits, or a share of such CVD."""
+    fed = {"fed": 1e-7, "produced": 0.0, "reacted": 0.0, "left": 0.0, "stored": 1e-7, "balance_error": 0.0}
+    trace = {
+        "fed": 0.0,
+        "produced": 3e-34,
+        "reacted": 0.0,
+        "left": 0.0,
+        "stored": 3e-34,
+        "balance_error": 0.0,
+    }
+    cvd = {"rate_mean": 1e-40, "share_in_zone": {"zone1": 0.9}}
+    summary = {"species": {"TMA": fed, "Al(OH)3": trace}, "cvd": cvd}
+    assert [row.shown for row in accounts(summary)[1].rows] == ["0"] * 5
+    assert set(accounts(summary)[1].shares) == {""}
+    assert [row.shown for _, rows in groups(summary) for row in rows] == ["0", "0"]
+
+
+def test_the_verdict_counts_inlets_together(cycle: Path) -> None:
+    """Fails when four zones of one precursor take four sentences, a trace is printed with digits, or nothing coated goes unsaid."""
+    case = load_run(cycle).case
+    twice = {"tma": {"exit_mean": 0.5, "exit_min": 0.25}, "water": {"exit_mean": 1e-9}}
+    said = verdict(case, {"titration": twice, "status": "done", "simulated_seconds": 2.0})
+    assert "zone of tma with 50 % of its sites turned into OAl(CH3)2 (worst row 25 %); " in said
+    assert "zone of water with less than 0.001 % of its sites turned into OH; " in said
+    changes = {f"geometry.inlet.purge{i}.mass_fractions.TMA": 1e-3 for i in (1, 2)}
+    both = {"purge1": twice["tma"], "purge2": {"exit_mean": 0.75, "exit_min": 0.5}}
+    said = verdict(load_case("single_cycle", changes), {"titration": both, "status": "done"})
+    assert "the zones of purge1, purge2 with 50 % to 75 % of its sites" in said and "(worst row 25 %)" in said
+    undosed = load_case(
+        "single_cycle", {f"geometry.inlet.{name}.mass_fractions": {} for name in ("tma", "water")}
+    )
+    assert "nothing has been coated: no inlet doses a surface" in verdict(undosed, {"status": "done"})
+    assert "no coverage has been reported" in verdict(case, {"status": "failed"})
+
+
+def test_long_names_have_room_beside_the_strip() -> None:
+    """Fails when a long name of a layer is cut, or names of zones are written over each other."""
+    short = drawing(load_case("single_cycle"))
+    assert short.right < 250.0 and short.hidden_zones == []
+    long = replace(short, zones=[("a_zone_with_a_long_name", 0.0, 30.0), ("b", 30.0, 860.0)])
+    assert long.hidden_zones == ["a_zone_with_a_long_name", "b"]
+    band = replace(short.bands[0], text="x" * 60)
+    assert replace(short, bands=[band]).right > 60 * LETTER
+
+
+NARROW = 400
+"""Width of a telephone."""
+
+
+@pytest.mark.browser
+def test_pages_fit_a_narrow_window(zone: Path, weaker: Path, cycle: Path, browser: Any) -> None:
+    """Fails when something sticks out of a narrow window instead of scrolling by itself."""
+    for where in (cycle, [zone, weaker]):
+        page = Page(browser, report(where))
+        page.page.set_viewport_size({"width": NARROW, "height": 800})
+        page.page.wait_for_timeout(200)
+        assert page("document.documentElement.scrollWidth") == NARROW

@@ -11,7 +11,7 @@ from typing import Any
 from mpm.compare import changed_keys, changed_numbers
 from mpm.errors import InputError
 from mpm.fieldnames import superscript
-from mpm.page.fields import DECADES, read_film, value_range
+from mpm.page.fields import Look, extent, read_film, value_range
 from mpm.page.numbers import rounded
 from mpm.page.run_page import RunPage, run_page
 from mpm.page.viewer import BUDGET, VALUES, looks, viewer
@@ -81,18 +81,17 @@ def told_apart(paths: Sequence[Path]) -> list[str]:
 
 
 def shared_bounds(runs: Sequence[Run]) -> dict[str, tuple[float, float]]:
-    """One colour range for each field, that of all runs and times together."""
-    ends: dict[str, tuple[float, float]] = {}
+    """One colour range for each field, that of all runs and times together; fields that are zero throughout in all runs have none."""
+    found: dict[str, tuple[Look, list[float]]] = {}
     for run in runs:
         known = looks(run)
-        shown_fields = read_film(run, {name: make for name, (_, make) in known.items()}, VALUES)
-        for name, series in shown_fields.series.items():
+        film = read_film(run, {name: make for name, (_, make) in known.items()}, VALUES)
+        for name, series in film.series.items():
             look = known[name][0]
-            low, high = value_range(look, series)
-            if name in ends:
-                low, high = min(low, ends[name][0]), max(high, ends[name][1])
-            ends[name] = (high * 10.0**-DECADES if look.logarithmic else low, high)
-    return ends
+            found.setdefault(name, (look, []))[1].extend(extent(look, series))
+    return {
+        name: value_range(look, min(ends), max(ends)) for name, (look, ends) in found.items() if any(ends)
+    }
 
 
 def key_table(runs: Sequence[Run]) -> list[Changed]:
@@ -135,6 +134,8 @@ def _number_line(what: Quantity, numbers: Sequence[Mapping[str, float]]) -> Chan
     relative = [
         ""
         if value is None or not first or texts[0] == "0"
+        else "0 %"
+        if value == first
         else f"{100.0 * (value - first) / abs(first):+.3g} %"
         for value in values[1:]
     ]

@@ -94,7 +94,7 @@ def encode(
     look: Look, series: Sequence[NDArray[np.floating]], bounds: tuple[float, float] | None = None
 ) -> Encoded:
     """One field at all times, in SI; `bounds` (in the shown unit) to share a range with other runs, else that of the values."""
-    low, high = bounds or value_range(look, series)
+    low, high = bounds or value_range(look, *extent(look, series))
     stored: list[NDArray[np.uint16]] = []
     frames: list[int] = []
     for values in series:
@@ -111,11 +111,16 @@ def encode(
     return Encoded(look, low, high, data, tuple(frames))
 
 
-def value_range(look: Look, series: Iterable[NDArray[np.floating]]) -> tuple[float, float]:
-    """Least and largest value over all times in the shown unit: 0 to 1 for a coverage, DECADES below the largest on a logarithmic range."""
+def extent(look: Look, series: Iterable[NDArray[np.floating]]) -> tuple[float, float]:
+    """Least and largest value over all times, in the shown unit; 0 and 0 where there are none."""
     finite = [values[np.isfinite(values)] for values in series]
     low = min((float(v.min()) for v in finite if v.size), default=0.0) / look.factor
     high = max((float(v.max()) for v in finite if v.size), default=0.0) / look.factor
+    return low, high
+
+
+def value_range(look: Look, low: float, high: float) -> tuple[float, float]:
+    """The colour range for an extent: 0 to 1 for a coverage, DECADES below the largest value on a logarithmic range."""
     if look.name.startswith("theta_"):
         return 0.0, 1.0
     if look.logarithmic:

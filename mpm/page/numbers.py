@@ -98,13 +98,15 @@ class Account:
 def accounts(summary: Mapping[str, Any]) -> list[Account]:
     """The sheet, species that never occurred left out."""
     steady = summary.get("fidelity") == "steady"
+    numbers = flatten(summary)
     found = []
     for species, entry in summary.get("species", {}).items():
         came = entry.get("fed", 0.0) + entry.get("produced", 0.0)
-        largest = max((abs(entry.get(term, 0.0)) for term in TERMS), default=0.0)
+        largest = max(abs(entry.get(term, 0.0)) for term in TERMS)
         if largest == 0.0:
             continue
-        rows = [row(f"species.{species}.{term}", entry.get(term, 0.0), steady, largest) for term in TERMS]
+        scale = max(largest, natural_scale(f"species.{species}.fed", numbers))
+        rows = [row(f"species.{species}.{term}", entry.get(term, 0.0), steady, scale) for term in TERMS]
         whole = came if came > 0.0 else largest
         shares = ["" if r.shown == "0" else f"{100.0 * r.value / whole:.3g}" for r in rows]
         found.append(Account(species, rows, shares, entry.get("balance_error", 0.0)))

@@ -35,8 +35,11 @@ function valueOf(field, level) {
   return field.log ? field.low * Math.pow(field.high / field.low, place) : field.low + place * (field.high - field.low);
 }
 
+// A name as plotly writes it, which takes <i> and &amp; for markup.
+const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
+
 // A title beside a colour bar, in lines that fit its length.
-const folded = (text) => text.replace(/(.{14,}?) /g, "$1<br>");
+const folded = (text) => plain(text).replace(/(.{14,}?) /g, "$1<br>");
 
 class Viewer {
   constructor(element, film, others) {
@@ -317,17 +320,22 @@ class Explorer {
       const map = this.sweep.grid && this.sweep.axes.length === 2;
       const traces = map ? [this.map(number, along, logarithmic)] : this.lines(number, along);
       const x = this.sweep.axes[along], y = map ? this.sweep.axes[1 - along] : null;
-      const axis = (one) => ({ title: { text: this.titled(one) }, type: typeof one.values[0] === "string" ? "category" : one.log ? "log" : "linear", zeroline: false, exponentformat: "power" });
-      const up = map ? axis(y) : { title: { text: this.titled(number) }, type: logarithmic ? "log" : "linear", zeroline: false, exponentformat: "power" };
-      await Plotly.react(plot, traces, { margin: { l: 70, r: 20, t: 30, b: 48 }, font: FONT, xaxis: axis(x), yaxis: up, hovermode: "closest", legend: { orientation: "h", y: 1.02, yanchor: "bottom" } }, CONFIG);
+      // a map is a table of cells: every value has a place and its number, however far apart they are
+      const kind = (one) => (map || typeof one.values[0] === "string" ? "category" : one.log ? "log" : "linear");
+      const axis = (text, type) => ({ title: { text, standoff: 8 }, type, automargin: true, zeroline: false, exponentformat: "power" });
+      const across = axis(plain(this.titled(x)), kind(x));
+      const up = map ? axis(plain(this.titled(y)), kind(y)) : axis(folded(this.titled(number)), logarithmic ? "log" : "linear");
+      await Plotly.react(plot, traces, { margin: { l: 70, r: 20, t: 30, b: 48 }, font: FONT, xaxis: across, yaxis: up, hovermode: "closest", legend: { orientation: "h", y: 1.02, yanchor: "bottom" } }, CONFIG);
       if (!plot.dataset.listens) { plot.on("plotly_click", plot.open); plot.dataset.listens = "yes"; }
       plot.dataset.number = number.name;
     }
   }
 
+  level(axis, index) { return plain(`${axis.label} ${axis.values[index]} ${axis.unit}`.trim()); }
+
   // All axes of a point and its number, for the pointer.
   words(index, number) {
-    const axes = this.sweep.axes.map((axis) => `${axis.label} ${axis.values[index]} ${axis.unit}`);
+    const axes = this.sweep.axes.map((axis) => this.level(axis, index));
     const value = number.values[index];
     return [`<b>${value === null ? "no result" : Number(value.toPrecision(4))} ${number.unit}</b>`, ...axes].join("<br>");
   }
@@ -339,13 +347,13 @@ class Explorer {
     const z = make(null), text = make(""), pages = make("");
     number.values.forEach((value, index) => {
       const column = across.indexOf(this.sweep.axes[along].values[index]), row = up.indexOf(this.sweep.axes[1 - along].values[index]);
-      z[row][column] = value === null ? null : logarithmic ? Math.log10(value) : value;
+      z[row][column] = value === null || (logarithmic && value <= 0) ? null : logarithmic ? Math.log10(value) : value;
       text[row][column] = this.words(index, number);
       pages[row][column] = this.sweep.pages[index];
     });
     return {
       type: "heatmap", x: across, y: up, z, text, customdata: pages, hovertemplate: "%{text}<extra></extra>", colorscale: "Viridis", xgap: 1, ygap: 1,
-      colorbar: { title: { text: (logarithmic ? "log10 of " : "") + this.titled(number), side: "right" }, thickness: 14 },
+      colorbar: { title: { text: folded((logarithmic ? "log10 of " : "") + this.titled(number)), side: "right" }, thickness: 14 },
     };
   }
 
@@ -353,7 +361,7 @@ class Explorer {
   lines(number, along) {
     const { axes, grid } = this.sweep, groups = new Map();
     number.values.forEach((value, index) => {
-      const name = grid ? axes.filter((_, i) => i !== along).map((axis) => `${axis.label} ${axis.values[index]} ${axis.unit}`).join(", ") : "";
+      const name = grid ? axes.filter((_, i) => i !== along).map((axis) => this.level(axis, index)).join(", ") : "";
       if (!groups.has(name)) groups.set(name, []);
       groups.get(name).push(index);
     });
@@ -372,7 +380,7 @@ function drawCharts() {
   for (const place of document.querySelectorAll(".chart")) {
     const chart = data.charts[place.dataset.chart];
     const layout = { margin: { l: 68, r: 12, t: 30, b: 42 }, font: FONT, legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom" }, showlegend: true, ...chart.layout };
-    Plotly.newPlot(place, chart.data, layout, CONFIG);
+    Plotly.newPlot(place, chart.data.map((trace) => ({ ...trace, name: plain(trace.name) })), layout, CONFIG);
   }
 }
 

@@ -70,6 +70,18 @@ class Drawing:
     below: int = 0
     ticks: Sequence[tuple[float, str]] = field(default=())
 
+    @property
+    def right(self) -> float:
+        """Width of the names beside the strip."""
+        axis = len(f"x [mm], {self.scale}")
+        return 34.0 + LETTER * max(axis, *(len(band.text) for band in self.bands))
+
+    @property
+    def hidden_zones(self) -> list[str]:
+        """All zones from the left, where a name is too long to be written into its zone."""
+        fits = all(LETTER * len(name) <= end - start for name, start, end in self.zones)
+        return [] if fits or len(self.zones) < 2 else [name for name, _, _ in self.zones]
+
 
 def drawing(case: Case) -> Drawing:
     """Lay the strip out."""
@@ -104,6 +116,10 @@ def _bands(case: Case, per_metre: float) -> list[Band]:
     for layer in layers:
         tops.append(tops[-1] + layer.height * per_metre)
     middles = apart([0.5 * (a + b) for a, b in pairwise(tops)], LINE)
+    above = max(
+        0.0, middles[-1] - tops[-1] + 0.5 * LINE
+    )  # the names of thin layers must not run into the axis below
+    middles = [middle - above for middle in middles]
     bands = []
     for layer, top, middle in zip(layers, tops, middles, strict=False):
         text = f"{layer.name}, {layer.height * MM:g} mm"

@@ -15,7 +15,7 @@ from mpm.keys import find_key
 from mpm.page.numbers import shown
 from mpm.page.run_page import run_html, run_page
 from mpm.page.write import render, write_page
-from mpm.quantities import quantity
+from mpm.quantities import RATIO, Quantity, quantity
 from mpm.schema import number_text
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
@@ -67,6 +67,11 @@ class Point:
     error: str
     page: str
 
+    @property
+    def words(self) -> str:
+        """Its status as people say it."""
+        return self.status.replace("_", " ") or "pending"
+
 
 @dataclass(frozen=True, eq=False)
 class SweepPage:
@@ -80,9 +85,12 @@ class SweepPage:
 
     @property
     def counts(self) -> str:
-        """How the points ended, in words."""
-        states = [point.status or "pending" for point in self.points]
-        return ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
+        """How many points there are and how they ended, in words."""
+        states = [point.words for point in self.points]
+        count = len(states)
+        return f"{count} point{'s' if count != 1 else ''}: " + ", ".join(
+            f"{states.count(state)} {state}" for state in dict.fromkeys(states)
+        )
 
 
 def sweep_page(directory: str | Path, say: Callable[[str], None] = lambda text: None) -> SweepPage:
@@ -99,7 +107,7 @@ def sweep_page(directory: str | Path, say: Callable[[str], None] = lambda text: 
     varied = [
         column
         for column in columns
-        if len(set(column.values)) > 1 and not column.name.endswith("balance_error")
+        if (len(rows) == 1 or len(set(column.values)) > 1) and not column.name.endswith("balance_error")
     ]
     return SweepPage(
         title=about.get("title") or root.resolve().name,
@@ -143,13 +151,15 @@ def _tidy(value: float) -> float:
 
 def _column(name: str, cells: Sequence[str], steady: bool) -> Column:
     what = quantity(name, steady)
-    values = [float(f"{what.of(float(cell)):.6g}") if _is_number(cell) else None for cell in cells]
+    values = [
+        _clean(float(f"{what.of(float(cell)):.6g}"), what) if _is_number(cell) else None for cell in cells
+    ]
     return Column(name, what.label, superscript(what.unit_shown), what.meaning, values)
 
 
-def visible(column: Column, value: float) -> str:
-    """A number of the table; of shares and coverages what is rounding beside 1 is 0."""
-    return "0" if not column.unit and abs(value) < ROUNDING else shown(value)
+def _clean(value: float, what: Quantity) -> float:
+    """Of shares and coverages what is rounding beside 1 is 0, in the charts too."""
+    return 0.0 if what.unit == RATIO and abs(value) < ROUNDING else value
 
 
 def _is_number(cell: str) -> bool:
@@ -207,6 +217,6 @@ def sweep_html(page: SweepPage) -> str:
         page.title,
         {"charts": {}, "sweep": data},
         page=page,
-        shown=visible,
+        shown=shown,
         number_text=number_text,
     )

@@ -89,7 +89,7 @@ def viewer(
 ) -> dict[str, Any] | None:
     """The fields for the page's script, as many times and cells as `budget` bytes allow; None when none are stored and whole.
 
-    `bounds`: colour ranges (in shown units) by field, to compare runs; fields that are zero throughout are left out.
+    `bounds`: colour ranges (in shown units) by field, to compare runs; other fields that are zero throughout are left out.
     """
     known = looks(run)
     wanted = {name: make for name, (_, make) in known.items()} | {"streams": stream_maker()}
@@ -106,11 +106,11 @@ def viewer(
 def encoded(
     shown: Film, known: Mapping[str, Look], bounds: Mapping[str, tuple[float, float]]
 ) -> list[Encoded]:
-    """Every field of a film that is not zero throughout."""
+    """Every field of a film that has a range in `bounds` or is not zero throughout."""
     found = []
     for name, series in shown.series.items():
         look = known.get(name, STREAMS)
-        if any(np.nanmax(np.abs(values), initial=0.0) > 0.0 for values in series):
+        if name in bounds or any(np.nanmax(np.abs(values), initial=0.0) > 0.0 for values in series):
             found.append(encode(look, series, bounds.get(name)))
     return found
 
