@@ -428,13 +428,14 @@ def test_rounding_is_no_result_of_a_sweep(tmp_path: Path) -> None:
     rows = [
         (1e-4, 0.01, 4e-16, "done", ""),
         (2e-4, 0.01, 1e-17, "done", ""),
-        (2e-4, 0.02, "", "failed", "diverged <b>"),
+        (2e-4, 0.02, "", "bad_input", "diverged <b>"),
     ]
     folder = sweep_folder(tmp_path, rows)
-    page = sweep_page(folder)
-    assert [column.values for column in page.columns] == [[0.0, 0.0, None]]
-    assert page.counts == "3 points: 2 done, 1 failed"
-    assert "failed: diverged &lt;b&gt;" in report(folder).read_text()
+    assert sweep_page(folder).columns == []  # twice 0, and once nothing
+    page = sweep_page(sweep_folder(tmp_path, [*rows, (1e-4, 0.02, 0.5, "done", "")]))
+    assert [column.values for column in page.columns] == [[0.0, 0.0, None, 0.5]]
+    assert page.counts == "4 points: 3 done, 1 bad input"
+    assert "bad input: diverged &lt;b&gt;" in report(folder).read_text()
 
 
 def test_a_sweep_of_one_point_shows_its_numbers(tmp_path: Path) -> None:

@@ -36,10 +36,10 @@ def chart(
     y_range: Sequence[float] | None = None,
 ) -> Chart:
     """A figure: `title`, titles of the axes with their units, traces; a logarithmic axis shows DECADES."""
-    across: dict[str, Any] = {"title": {"text": x}, "zeroline": False}
-    up: dict[str, Any] = {"title": {"text": y}, "zeroline": False}
+    across: dict[str, Any] = {"title": {"text": x}, "zeroline": False, "exponentformat": "power"}
+    up: dict[str, Any] = {"title": {"text": y}, "zeroline": False, "exponentformat": "power"}
     if logarithmic:
-        up |= {"type": "log", "exponentformat": "power", "dtick": 1}
+        up |= {"type": "log", "dtick": 1}
         y_range = _decades(traces)
     for axis, ends in ((across, x_range), (up, y_range)):
         if ends is not None:

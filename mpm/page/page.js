@@ -5,6 +5,7 @@ const LEVELS = 4095;
 const data = JSON.parse(document.getElementById("data").textContent);
 const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
 const FONT = { family: "system-ui, Segoe UI, Helvetica Neue, Arial, sans-serif", size: 12, color: "#1d2530" };
+const POWERS = { exponentformat: "power" }; // plotly's own is 2p for 2e-12
 
 async function unpack(text, kind) {
   const raw = atob(text), bytes = new Uint8Array(raw.length);
@@ -137,7 +138,7 @@ class Viewer {
   heatmap(field, z, logarithmic) {
     const low = logarithmic ? Math.log10(field.low) : field.low, high = logarithmic ? Math.log10(field.high) : field.high;
     const short = field.label.replace(/ \(.*/, ""); // the whole of it stands in the list of fields
-    const bar = { title: { text: folded(field.unit ? `${short} [${field.unit}]` : short), side: "right" }, thickness: 14, len: 1 };
+    const bar = { title: { text: folded(field.unit ? `${short} [${field.unit}]` : short), side: "right" }, thickness: 14, len: 1, ...POWERS };
     if (logarithmic) {
       bar.tickvals = []; bar.ticktext = [];
       for (let power = Math.ceil(low - 1e-9); power <= high; power++) { bar.tickvals.push(power); bar.ticktext.push(`1e${power}`); }
@@ -322,7 +323,7 @@ class Explorer {
       const x = this.sweep.axes[along], y = map ? this.sweep.axes[1 - along] : null;
       // a map is a table of cells: every value has a place and its number, however far apart they are
       const kind = (one) => (map || typeof one.values[0] === "string" ? "category" : one.log ? "log" : "linear");
-      const axis = (text, type) => ({ title: { text, standoff: 8 }, type, automargin: true, zeroline: false, exponentformat: "power" });
+      const axis = (text, type) => ({ title: { text, standoff: 8 }, type, automargin: true, zeroline: false, ...POWERS });
       const across = axis(plain(this.titled(x)), kind(x));
       const up = map ? axis(plain(this.titled(y)), kind(y)) : axis(folded(this.titled(number)), logarithmic ? "log" : "linear");
       await Plotly.react(plot, traces, { margin: { l: 70, r: 20, t: 30, b: 48 }, font: FONT, xaxis: across, yaxis: up, hovermode: "closest", legend: { orientation: "h", y: 1.02, yanchor: "bottom" } }, CONFIG);
@@ -353,7 +354,7 @@ class Explorer {
     });
     return {
       type: "heatmap", x: across, y: up, z, text, customdata: pages, hovertemplate: "%{text}<extra></extra>", colorscale: "Viridis", xgap: 1, ygap: 1,
-      colorbar: { title: { text: folded((logarithmic ? "log10 of " : "") + this.titled(number)), side: "right" }, thickness: 14 },
+      colorbar: { title: { text: folded((logarithmic ? "log10 of " : "") + this.titled(number)), side: "right" }, thickness: 14, ...POWERS },
     };
   }
 

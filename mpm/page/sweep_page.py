@@ -57,6 +57,11 @@ class Column:
     meaning: str
     values: Sequence[float | None]
 
+    @property
+    def varies(self) -> bool:
+        """Whether two points with a result differ in it."""
+        return len(set(self.values) - {None}) > 1
+
 
 @dataclass(frozen=True)
 class Point:
@@ -107,7 +112,7 @@ def sweep_page(directory: str | Path, say: Callable[[str], None] = lambda text: 
     varied = [
         column
         for column in columns
-        if (len(rows) == 1 or len(set(column.values)) > 1) and not column.name.endswith("balance_error")
+        if (len(rows) == 1 or column.varies) and not column.name.endswith("balance_error")
     ]
     return SweepPage(
         title=about.get("title") or root.resolve().name,
