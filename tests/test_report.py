@@ -1,7 +1,9 @@
 """The report pages: their numbers are the run's, they need no network, and in a browser they do what they show."""
 
 import csv
+import errno
 import json
+import os
 import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -16,7 +18,17 @@ from mpm.cli import main
 from mpm.page import report
 from mpm.page.compare_page import compare_page
 from mpm.page.curves import curves
-from mpm.page.fields import DECADES, LEVELS, Look, chosen_times, encode, joined_edges, levels, value_of
+from mpm.page.fields import (
+    DECADES,
+    LEVELS,
+    Look,
+    chosen_times,
+    encode,
+    joined_edges,
+    levels,
+    value_of,
+    value_range,
+)
 from mpm.page.numbers import accounts, groups
 from mpm.page.run_page import run_page
 from mpm.page.strip import LETTER, drawing
@@ -349,8 +361,9 @@ def test_what_is_no_run_is_refused(zone: Path, tmp_path: Path) -> None:
         report(tmp_path)
     with pytest.raises(InputError, match="at most 6"):
         report([zone] * 7)
-    with pytest.raises(InputError, match="cannot be written"):
-        report(zone, zone / "case.toml" / "report.html")
+    for nowhere in (zone / "case.toml" / "report.html", "", "/"):
+        with pytest.raises(InputError, match="cannot be written"):
+            report(zone, nowhere)
 
 
 def test_a_result_writes_its_page(tmp_path: Path) -> None:
@@ -516,3 +529,31 @@ def test_pages_fit_a_narrow_window(zone: Path, weaker: Path, cycle: Path, browse
         page.page.set_viewport_size({"width": NARROW, "height": 800})
         page.page.wait_for_timeout(200)
         assert page("document.documentElement.scrollWidth") == NARROW
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "shown"),
+    [
+        (1.0, 1.00001, (0.0, 1.00001)),
+        (-2.0, -2.0, (-2.0, 0.0)),
+        (0.0, 0.0, (0.0, 1.0)),
+        (-1.0, 3.0, (-1.0, 3.0)),
+    ],
+)
+def test_what_is_even_has_no_rainbow(low: float, high: float, shown: tuple[float, float]) -> None:
+    """Fails when the rounding of a field that is the same everywhere gets all the colours."""
+    assert value_range(Look("velocity", "speed", "cm/s", 1.0, False, "Viridis"), low, high) == shown
+
+
+def test_a_page_that_finds_no_room_costs_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when a run that is done counts as failed because its page could not be written, or that goes unsaid."""
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "here/report.html")
+
+    monkeypatch.setattr("mpm.page.write.write_atomically", full)
+    tiny = [f"--set={key}={value}" for key, value in {**TINY, "time.end": "0.1 s"}.items()]
+    assert main(["run", "single_zone", "-q", "-o", str(tmp_path / "run"), *tiny]) == 0
+    assert capsys.readouterr().err.endswith("no report: here/report.html: No space left on device\n")

@@ -149,7 +149,8 @@ def _show(case: Case, summary: dict[str, Any], directory: Path, report: bool, qu
         try:
             page = write(directory, say=lambda line: print(line, file=sys.stderr))
         except (MpmError, OSError) as error:
-            print(f"no report: {error}", file=sys.stderr)
+            words = f"{error.filename}: {error.strerror}" if isinstance(error, OSError) else error
+            print(f"no report: {words}", file=sys.stderr)
             return
         if not quiet:
             print(f"Report: {page}")

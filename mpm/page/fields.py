@@ -27,6 +27,8 @@ LEVELS = 4095
 """Levels of a colour range; 0 stands below them for what is less than the smallest value of a logarithmic range, or is not there."""
 DECADES = 6
 """Extent of a logarithmic range below its largest value."""
+EVEN = 1e-3
+"""Relative differences that do not make a picture: a field that is even to this is shown from zero."""
 MOST_TIMES, FEWEST_TIMES = 161, 21
 """Stored times that a page carries: at most, and before cells are joined instead."""
 MOST_JOINED = 16
@@ -120,13 +122,15 @@ def extent(look: Look, series: Iterable[NDArray[np.floating]]) -> tuple[float, f
 
 
 def value_range(look: Look, low: float, high: float) -> tuple[float, float]:
-    """The colour range for an extent: 0 to 1 for a coverage, DECADES below the largest value on a logarithmic range."""
+    """The colour range for an extent: 0 to 1 for a coverage, DECADES below the largest on a logarithmic range, from 0 where it is EVEN."""
     if look.name.startswith("theta_"):
         return 0.0, 1.0
     if look.logarithmic:
         high = high if high > 0.0 else 1.0
         return high * 10.0**-DECADES, high
-    return (low, high) if high > low else (low, low + (abs(low) or 1.0))
+    if high - low > EVEN * max(abs(low), abs(high)):
+        return low, high
+    return min(low, 0.0), max(high, 0.0) or (1.0 if low == 0.0 else 0.0)
 
 
 @dataclass(frozen=True, eq=False)

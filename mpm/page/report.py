@@ -29,12 +29,10 @@ def report(
     """
     paths = [Path(directories)] if isinstance(directories, str | Path) else [Path(one) for one in directories]
     if len(paths) == 1:
+        where = paths[0] / NAME if output is None else Path(output)
         if kind_of_directory(paths[0]) is SWEEP_RUN:
-            return write_page(
-                Path(output) if output else paths[0] / NAME, sweep_html(sweep_page(paths[0], say))
-            )
-        page = run_page(paths[0], say)
-        return write_page(Path(output) if output else paths[0] / NAME, run_html(page))
+            return write_page(where, sweep_html(sweep_page(paths[0], say)))
+        return write_page(where, run_html(run_page(paths[0], say)))
     several = compare_page(paths, say)
     beside = paths[0].resolve().parent / f"report_{'_'.join(file_name(name) for name in several.names)}.html"
-    return write_page(Path(output) if output else beside, compare_html(several))
+    return write_page(beside if output is None else Path(output), compare_html(several))

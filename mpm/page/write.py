@@ -74,4 +74,6 @@ def write_page(path: Path, html: str) -> Path:
         if error.errno in FULL:
             raise
         raise InputError(f"{path}: the page cannot be written ({error.strerror})") from None
+    except ValueError as error:  # -o "", -o /
+        raise InputError(f"{path}: the page cannot be written (no name of a file: {error})") from None
     return path
