@@ -16,7 +16,7 @@ import pytest
 from mpm import InputError, Reactor, load_case, load_run
 from mpm.cli import main
 from mpm.page import report
-from mpm.page.compare_page import compare_page
+from mpm.page.compare_page import compare_page, number_table
 from mpm.page.curves import curves
 from mpm.page.fields import (
     DECADES,
@@ -557,3 +557,11 @@ def test_a_page_that_finds_no_room_costs_no_run(
     tiny = [f"--set={key}={value}" for key, value in {**TINY, "time.end": "0.1 s"}.items()]
     assert main(["run", "single_zone", "-q", "-o", str(tmp_path / "run"), *tiny]) == 0
     assert capsys.readouterr().err.endswith("no report: here/report.html: No space left on device\n")
+
+
+def test_nothing_beside_what_is_not_reported_is_no_difference(zone: Path, tmp_path: Path) -> None:
+    """Fails when a steady and a transient run are compared by lines of dashes and zeros."""
+    Reactor(load_case("single_zone", {**COARSE, "fidelity": "steady"})).run(tmp_path / "steady")
+    lines = number_table([load_run(zone), load_run(tmp_path / "steady")])
+    assert ("TMA fed", "umol/m") in {(line.label, line.unit) for line in lines}
+    assert all(set(line.texts) - {"", "0"} for line in lines)

@@ -105,7 +105,7 @@ def key_table(runs: Sequence[Run]) -> list[Changed]:
 
 
 def number_table(runs: Sequence[Run]) -> list[Changed]:
-    """Reported numbers in which a run differs from the first by more than rounding."""
+    """Reported numbers in which a run differs from the first by more than rounding; 0 beside nothing is no difference."""
     found: dict[tuple[str, str], Quantity] = {}
     for run in runs[1:]:
         for change in changed_numbers(runs[0].summary, run.summary):
@@ -115,7 +115,7 @@ def number_table(runs: Sequence[Run]) -> list[Changed]:
         reports = [_has(what, run.summary.get("fidelity") == "steady") for run in runs]
         numbers = [flatten(run.summary) if has else {} for run, has in zip(runs, reports, strict=True)]
         lines.append(_number_line(what, numbers))
-    return lines
+    return [line for line in lines if set(line.texts) - {"", "0"}]
 
 
 def _has(what: Quantity, steady: bool) -> bool:

@@ -269,7 +269,7 @@ class Comparison {
 
   async drawDifference(shown) {
     const other = Number(this.pair.value), plot = this.plots[this.plots.length - 1], [a, b] = [shown[0], shown[other]];
-    this.times[this.times.length - 1].textContent = `of ${this.names[other]} minus ${this.names[0]}`;
+    this.times[this.times.length - 1].textContent = `${this.names[other]} minus ${this.names[0]}`;
     if (!a || !b) { Plotly.purge(plot); plot.textContent = "no difference: one of the runs has no such field"; return; }
     const [first, second] = [this.runs[0], this.runs[other]];
     const columns = centres(first.film.x).map((x) => cellAt(second.film.x, x)), rows = centres(first.film.y).map((y) => cellAt(second.film.y, y));
