@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from mpm.geometry import Grid
 
 log = logging.getLogger("mpm")
+FAILED = "failed: "
+"""What the last line of the log of a failed run begins with."""
 OWN_FILES = (
     "case.toml",
     "origin.json",

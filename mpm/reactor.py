@@ -27,7 +27,7 @@ from mpm.geometry import Grid
 from mpm.history import Row, columns_of
 from mpm.keys import values
 from mpm.motion import BedMotion, step_motion
-from mpm.output import RunDirectory
+from mpm.output import FAILED, RunDirectory
 from mpm.parallel import is_root, largest, on_root, total
 from mpm.phases import LastCycle, phase_fields
 from mpm.progress import FLOW, Progress, log_file
@@ -230,7 +230,7 @@ class Reactor:
         try:
             self._start(bar)
         except (ConvergenceError, Interrupted) as stopped:
-            log.error("%s", stopped)
+            _log_end(stopped)
             raise
         problem = steady_problem(self, 0, watch)
         try:
@@ -246,7 +246,7 @@ class Reactor:
         except ConvergenceError as unsettled:
             error = error or unsettled
         if error is not None:
-            log.error("%s", error)
+            _log_end(error)
         status = "done" if error is None else "interrupted" if isinstance(error, Interrupted) else "failed"
         self._write(directory, callback if error is None else None, None)
         summary = summarise(self, status, self.wall)
@@ -361,7 +361,7 @@ class Reactor:
 
     def _give_up(self, directory: RunDirectory | None, error: Exception) -> None:
         """Keep the last good state and say in summary.json how the run ended."""
-        log.error("%s", error)
+        _log_end(error)
         if directory is None or self.flows is None:
             return
         status = "interrupted" if isinstance(error, Interrupted) else "failed"
@@ -496,3 +496,8 @@ class Reactor:
         rows = self.grid.layer_rows(layer)
         chosen = (self.bed.rows >= rows.start) & (self.bed.rows < rows.stop)
         return self.bed.whole()[self.case.mechanism.site_names.index(site)][chosen]
+
+
+def _log_end(error: Exception) -> None:
+    """The last line of the log of a run that ends early: all that is left of one that has failed before its first step."""
+    log.error("%s%s", "" if isinstance(error, Interrupted) else FAILED, error)

@@ -16,7 +16,7 @@ from mpm.errors import ConvergenceError, InputError, Interrupted
 from mpm.files import locked, read_text
 from mpm.history import read_table
 from mpm.nextsteps import print_end, print_steps
-from mpm.output import RunDirectory
+from mpm.output import FAILED, RunDirectory
 from mpm.quantities import quantity
 from mpm.screen import duration, lines_of, say
 from mpm.tables import print_summary, shown
@@ -126,9 +126,12 @@ def _tell_end(path: Path, console: Console) -> None:
     if summary is not None:
         print_summary(summary, console)
         console.print()
-    print_steps([(f"mpm resume {name}", "go on"), (f"mpm plot {name}", "pictures of what there is")], console)
-    if summary is None:
+    pictures = [(f"mpm plot {name}", "pictures of what there is")] if look(path).numbers else []
+    print_steps([(f"mpm resume {name}", "go on"), *pictures], console)
+    status = "failed" if last.startswith(FAILED) else (summary or {}).get("status")
+    last = last.removeprefix(FAILED)
+    if status is None:
         raise Interrupted(f"{path}: the run was ended from outside; the last word of its log: {last}")
-    if summary.get("status") == "failed":
+    if status == "failed":
         raise ConvergenceError(f"{path}: the run has failed: {last}")
     raise Interrupted(f"{path}: the run was interrupted: {last}")

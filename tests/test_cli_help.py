@@ -77,13 +77,24 @@ def test_every_verb_has_examples_that_it_takes(name: str) -> None:
         command.make_context(name, arguments)  # raises what a user would be told
 
 
-@pytest.mark.parametrize("verb", ["run", "resume", "check", "mesh", "plot", "sweep", "optimise", "dem"])
+@pytest.mark.parametrize("verb", ["run", "resume", "check", "mesh", "plot", "sweep", "optimise"])
 def test_a_bare_verb_says_what_it_needs(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Fails when a verb without its argument does not say in one line what is missing, with an example, or ends with another status."""
+    """Fails when a verb without its argument does not show its help and say in one line what is missing, or ends with another status."""
+    assert main([verb, "-h"]) == 0
+    text, _ = capsys.readouterr()
     assert main([verb]) == 2
     out, err = capsys.readouterr()
-    assert out == "" and len(err.splitlines()) == 1
+    assert out == text and len(err.splitlines()) == 1
     assert " is missing: " in err and f"; for example: mpm {verb} " in err and " -h explains more)" in err
+
+
+def test_bare_dem_is_its_help(capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when `mpm dem`, a program of several verbs, does not list them as `mpm` does."""
+    assert main(["dem", "-h"]) == 0
+    text, _ = capsys.readouterr()
+    assert "waveform" in text
+    assert main(["dem"]) == 0
+    assert capsys.readouterr() == (text, "")
 
 
 def test_words_that_are_no_verb_or_option(capsys: pytest.CaptureFixture[str]) -> None:

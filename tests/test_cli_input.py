@@ -407,7 +407,7 @@ def test_broken_profile_is_refused(
     [
         (["run", "nowhere.toml"], "nowhere.toml: found no such file"),
         (["run", "."], "found the directory of a run"),
-        (["run"], "CASE is missing"),
+        (["run", "--name", "wide"], "CASE is missing"),
         (["runn", "case.toml"], "No such command"),
         (["run", "case.toml", "--reusme"], "No such option"),
         (["run", "case.toml", "--resume", "--overwrite"], "one of them"),

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ import pytest
 from mpm import InputError, Reactor, load_case, load_run
 from mpm.cli import main
 from mpm.page import report
-from mpm.page.compare_page import compare_page, number_table
+from mpm.page.compare_page import compare_page, key_table, number_table
 from mpm.page.curves import curves
 from mpm.page.fields import (
     DECADES,
@@ -449,6 +450,30 @@ def test_rounding_is_no_result_of_a_sweep(tmp_path: Path) -> None:
     assert [column.values for column in page.columns] == [[0.0, 0.0, None, 0.5]]
     assert page.counts == "4 points: 3 done, 1 bad input"
     assert "bad input: diverged &lt;b&gt;" in report(folder).read_text()
+
+
+def test_changed_keys_are_written_as_people_type_them() -> None:
+    """Fails when the page of two runs says 0.01 m/s where the case and `mpm compare` say 1 cm/s, or a run gets the value of another."""
+    runs: Any = [
+        SimpleNamespace(case=load_case("single_zone", {"motion.bed_velocity": speed}))
+        for speed in ("1 cm/s", "0.8 cm/s", "1 cm/s")
+    ]
+    (line,) = key_table(runs)
+    assert (line.label, list(line.texts)) == ("motion.bed_velocity", ["1 cm/s", "0.8 cm/s", "1 cm/s"])
+
+
+def test_an_axis_with_a_name_of_its_own_says_which_key_it_is(tmp_path: Path) -> None:
+    """Fails when the page of a sweep says `dose` and not what that is."""
+    folder = sweep_folder(tmp_path, [(1e-4, 0.01, 0.5, "done", "")])
+    key = "geometry.inlet.tma.mass_fractions.TMA"
+    for file in ("sweep.json", "results.csv"):
+        text = (folder / file).read_text()
+        (folder / file).write_text(
+            text.replace(key, "dose").replace('"keys": ["dose"]', f'"keys": ["{key}"]')
+        )
+    axis = sweep_page(folder).axes[0]
+    assert axis.name == "dose" and list(axis.keys) == [key] and "mass fraction" in axis.meaning
+    assert f"<td>dose</td><td><code>{key}</code></td>" in report(folder).read_text()
 
 
 def test_a_sweep_of_one_point_shows_its_numbers(tmp_path: Path) -> None:

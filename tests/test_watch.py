@@ -11,6 +11,7 @@ import pytest
 
 from mpm import watch
 from mpm.cli import main
+from mpm.errors import ConvergenceError
 from mpm.files import locked
 from mpm.output import RunDirectory
 from mpm.reactor import Reactor
@@ -93,6 +94,25 @@ def test_watching_ends_with_the_run(
     order = [text.index(words) for words in ("first words", "second words", "Newton stopped")]
     assert order == sorted(order)
     assert f"mpm resume {run.path}" in text
+
+
+@pytest.mark.parametrize("fidelity", ["averaged", "steady"])
+def test_a_run_that_fails_before_its_first_step_is_no_killed_one(
+    fidelity: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when the end of a run without a flow is told as one from outside, or pictures of nothing are offered."""
+
+    def fail(self: Reactor, bar: Any) -> None:
+        raise ConvergenceError("steady flow: not found")
+
+    monkeypatch.setattr(Reactor, "_start", fail)
+    path = tmp_path / "run"
+    with pytest.raises(ConvergenceError):
+        Reactor(zone({**SHORT, "fidelity": fidelity}, TINY), MPI.COMM_SELF).run(path)
+    assert main(["watch", str(path)]) == 3
+    out, err = capsys.readouterr()
+    assert err == f"{path}: the run has failed: steady flow: not found\n"
+    assert f"mpm resume {path}" in out and "mpm plot" not in out
 
 
 def test_what_is_no_run_is_not_watched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

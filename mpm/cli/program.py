@@ -35,11 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.getLogger("matplotlib").setLevel(
         logging.ERROR
     )  # a read-only home is said by us, where it matters
+    words = list(sys.argv[1:] if arguments is None else arguments)
     with _terminable():
         try:
-            result = typer.main.get_command(app).main(
-                list(sys.argv[1:] if arguments is None else arguments), prog_name="mpm", standalone_mode=False
-            )
+            result = typer.main.get_command(app).main(words, prog_name="mpm", standalone_mode=False)
             if result == Interrupted.exit_status:  # typer makes this of a KeyboardInterrupt
                 return _end(Interrupted.exit_status, "interrupted")
             return result if isinstance(result, int) else 0
@@ -48,6 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except (KeyboardInterrupt, typer.Abort):
             return _end(Interrupted.exit_status, "interrupted")
         except _USAGE_ERROR as error:
+            if (
+                len(words) == 1 and missing(error) and rank() == 0
+            ):  # a bare verb: somebody who looks for its help
+                print(error.ctx.get_help(), flush=True)
             line = missing(error) or f"mpm: {error.format_message()} ({_where(error)} -h lists what there is)"
             return _end(InputError.exit_status, line)
         except BrokenPipeError:  # the reader of our output has gone; let nothing more reach the pipe

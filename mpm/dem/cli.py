@@ -23,14 +23,14 @@ from .waveform import HarmonicWaveform, extension_velocity, peak_displacement
 
 
 class RunByDefault(Verbs):
-    """`mpm dem X ...` means `mpm dem run X ...` unless X is a command."""
+    """`mpm dem X ...` means `mpm dem run X ...` unless X is a command; `mpm dem` alone is its help, as `mpm` is."""
 
     groups: ClassVar[Mapping[str, Sequence[str]]] = {}
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if not args or args[0] not in {*self.commands, "--help", "-h"}:
+        if args and args[0] not in {*self.commands, "--help", "-h"}:
             args = ["run", *args]
-        return super().parse_args(ctx, args)
+        return super().parse_args(ctx, args or ["--help"])
 
 
 app = App(

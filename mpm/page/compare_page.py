@@ -11,6 +11,7 @@ from typing import Any
 from mpm.compare import changed_keys, changed_numbers
 from mpm.errors import InputError
 from mpm.fieldnames import superscript
+from mpm.keys import values
 from mpm.page.fields import Look, extent, read_film, value_range
 from mpm.page.numbers import rounded
 from mpm.page.run_page import RunPage, run_page
@@ -96,11 +97,14 @@ def shared_bounds(runs: Sequence[Run]) -> dict[str, tuple[float, float]]:
 
 def key_table(runs: Sequence[Run]) -> list[Changed]:
     """Keys of the resolved cases in which a run differs from the first."""
+    people = [{value.name: value.text for value in values(run.case)} for run in runs]
     texts: dict[str, list[str]] = {}
     for place, run in enumerate(runs[1:], start=1):
         for change in changed_keys(runs[0].case, run.case):
-            line = texts.setdefault(change.key, [change.first or ""] * len(runs))
-            line[place] = change.second or ""
+            first, second = (
+                people[i].get(change.key, raw) or "" for i, raw in ((0, change.first), (place, change.second))
+            )
+            texts.setdefault(change.key, [first] * len(runs))[place] = second
     return [Changed(key, "", "", line, (), ()) for key, line in texts.items()]
 
 

@@ -30,9 +30,10 @@ FIRST = ("titration.", "utilisation.", "dose_ratio.", "cvd.", "film.")
 
 @dataclass(frozen=True)
 class Axis:
-    """What was varied: `values` of all points in the unit that the sweep file writes; words as they are."""
+    """What was varied: `values` of all points of the `keys` in the unit that the sweep file writes; words as they are."""
 
     name: str
+    keys: Sequence[str]
     label: str
     unit: str
     meaning: str
@@ -141,12 +142,12 @@ def _axis(axis: dict[str, Any], cells: Sequence[str]) -> Axis:
     unit = axis["written_unit"]
     values = list(cells) if axis["kind"] == "word" else [_tidy(float(cell) / factor(unit)) for cell in cells]
     try:
-        meaning = find_key(axis["name"]).description
-    except InputError:  # an axis of several keys has a name of its own
-        meaning = ", ".join(axis["keys"])
+        meaning = find_key(axis["keys"][0]).description
+    except InputError:  # a key of a file that the case names
+        meaning = ""
     name = axis["name"]
     label = name if name.count(".") < 2 else ".".join(name.split(".")[-2:])
-    return Axis(name, label, unit, meaning, bool(axis["logarithmic"]), values)
+    return Axis(name, axis["keys"], label, unit, meaning, bool(axis["logarithmic"]), values)
 
 
 def _tidy(value: float) -> float:
