@@ -95,7 +95,7 @@ class Transport(Frozen):
 class Case(Frozen):
     """One simulation. Equal cases have equal content, wherever they were read from."""
 
-    title: str = ""
+    title: Annotated[str, Field(examples=["A wider TMA port"])] = ""
     """a line that names the case on screens, pictures and in results"""
     fidelity: Literal["resolved", "averaged", "steady"] = "averaged"
     """resolved: every phase of every vibration; averaged: their mean, in time; steady: the state that an averaged run ends in"""

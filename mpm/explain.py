@@ -1,13 +1,14 @@
-"""`mpm explain`: what a key of a case file, a table of keys, or a reported number means, as lines for a screen."""
+"""`mpm explain`: what a key of a case file, a table of keys, a reported number or a field means, as lines for a screen."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 
 from mpm.catalogue import sections
 from mpm.errors import InputError
 from mpm.keys import Key, all_keys, find_keys, keys_of, unknown_key
-from mpm.quantities import QUANTITIES, Quantity, known, quantity
+from mpm.quantities import QUANTITIES, RATIO, Quantity, known, quantity
 
 _NAMES = {
     "geometry.layer": "bed",
@@ -34,7 +35,7 @@ def explain(name: str) -> list[Line]:
     """What is known of a name. Raises InputError with the nearest names when it is no key, no number and nothing that `mpm list` has."""
     keys = find_keys(name)
     numbers = [quantity(name)] if known(name) else _numbers(name)
-    lines: list[Line] = [] if keys or numbers else _built_in(name)
+    lines: list[Line] = [] if keys or numbers else _built_in(name) or _field(name)
     if not keys and not numbers and not lines:
         others = [number.name for number in QUANTITIES]
         raise InputError(f"mpm explain: {unknown_key(name, others)}; mpm explain alone lists them all")
@@ -46,7 +47,9 @@ def explain(name: str) -> list[Line]:
 
 
 def overview() -> list[Line]:
-    """All keys by table, and all reported numbers, by name."""
+    """All keys by table, all reported numbers and all fields, by name."""
+    from mpm.fieldnames import FIELDS  # with numpy
+
     lines: list[Line] = [(0, "Keys of a case file (mpm explain KEY or TABLE says more)", 4)]
     for table in ("", *(key.name for key in all_keys() if key.is_table)):
         names = [key.last for key in keys_of(table) if not key.is_table]
@@ -57,7 +60,8 @@ def overview() -> list[Line]:
     for number in QUANTITIES:
         head, _, rest = number.name.partition(".")
         groups.setdefault(head if rest else "of the run", []).append(rest or head)
-    return lines + [(2, f"{head}: {', '.join(rest)}", 4) for head, rest in groups.items()]
+    lines += [(2, f"{head}: {', '.join(rest)}", 4) for head, rest in groups.items()]
+    return [*lines, _BLANK, (0, "Fields of a run", 4), (2, ", ".join(entry.name for entry in FIELDS), 4)]
 
 
 def _key(key: Key) -> Iterator[Line]:
@@ -134,6 +138,26 @@ def _built_in(name: str) -> list[Line]:
             (2, entry.facts, 0),
         )
     ]
+
+
+def _field(name: str) -> list[Line]:
+    """A field of the files for ParaView, as `mpm plot --field` takes it."""
+    from mpm.fieldnames import FIELDS, field_name  # with numpy
+
+    field = field_name(name)
+    if field.name == field.label and field.name not in {entry.name for entry in FIELDS}:
+        return []
+    unit = {RATIO: "a ratio", "": "a whole number"}.get(field.unit, field.unit)
+    shown = f", shown in {field.shown}" if field.shown else ""
+    vibration = name == "velocity_lab"
+    lines: list[Line] = [
+        (0, f"{name}: a field, with a value in every cell", 0),
+        (2, field.label, 0),
+        (2, f"{'unit':<{_LABEL}}{unit}{shown}", _LABEL),
+        (2, f"{'found in':<{_LABEL}}{'phases.pvd (output.phases)' if vibration else 'fields.pvd'}", _LABEL),
+    ]
+    picture = (2, f"{'a picture':<{_LABEL}}mpm plot DIR --field {shlex.quote(name)}", _LABEL)
+    return lines if vibration else [*lines, picture]
 
 
 def _numbers(name: str) -> list[Quantity]:

@@ -119,11 +119,11 @@ class Layer(Frozen):
 
     model_config = ConfigDict(json_schema_extra=only_name_required)
 
-    name: Name
+    name: Annotated[Name, Field(examples=["bed"])]
     """what the layer is called in results and in keys: letters, digits, _ and -"""
     height: Length
     """height of the layer"""
-    cells: Count
+    cells: Annotated[Count, Field(examples=[10])]
     """rows of cells in the layer: more resolve steeper fronts and take longer"""
     grading: Positive = 1.0
     """height of the layer's top row over that of its bottom row, 0.01 to 100; 1: equal rows"""
@@ -141,7 +141,7 @@ class Layer(Frozen):
 class _Port(Frozen):
     model_config = ConfigDict(json_schema_extra=only_name_required)
 
-    name: Name
+    name: Annotated[Name, Field(examples=["tma"])]
     """what the port is called in results and in keys: letters, digits, _ and -"""
     side: Literal["bottom", "top"]
     """the wall that the port is in"""
@@ -221,6 +221,8 @@ class Inlet(_Port):
 class Outlet(_Port):
     """A stretch of wall at ambient pressure."""
 
+    name: Annotated[Name, Field(examples=["zone1"])]
+    """what the port is called in results and in keys: letters, digits, _ and -"""
     side: Literal["bottom", "top"] = "top"
     """the wall that the outlet is in"""
 
@@ -228,13 +230,13 @@ class Outlet(_Port):
 class Zone(Frozen):
     """A named stretch of the strip, from `start` to `end` [m], with the inlet that doses it."""
 
-    name: Name
+    name: Annotated[Name, Field(examples=["zone1"])]
     """what the zone is called in results and in keys: letters, digits, _ and -"""
     start: Annotated[float, Dimension("m", "a position", "0 mm", at_least=0.0)]
     """left end of the zone, from the left end of the strip"""
     end: StripLength
     """right end of the zone, from the left end of the strip"""
-    inlet: str | None = None
+    inlet: Annotated[str | None, Field(examples=["tma"])] = None
     """name of the inlet whose precursor reacts in this zone: its titration is read where solids leave the zone"""
 
 

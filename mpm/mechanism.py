@@ -130,7 +130,7 @@ class Chemistry(_Table):
 
     mechanism: str = "alumina"
     """the reactions: the name of a built-in mechanism, the path of a mechanism file, or inline (all of it in this table)"""
-    name: str = worked_out("the mechanism's file name", "")
+    name: str = worked_out("the mechanism's file name", "", example="alumina")
     """what the mechanism is called in results"""
     species: dict[str, SpeciesTable] = {}
     """gas species, by name; keys given here lie over the mechanism's"""

@@ -244,6 +244,9 @@ def test_every_reported_number_is_explained(number, capsys: pytest.CaptureFixtur
         (["motion.gama"], 2, ["did you mean motion.gamma?", "mpm explain alone"]),
         (["titration.tma.exit_maen"], 2, ["did you mean titration.<inlet>.exit_mean?"]),
         (["glass_beads"], 0, ["one of the materials", "porosity 0.46"]),
+        (["x_TMA"], 0, ["x_TMA: a field", "mole fraction of TMA", "a ratio", "mpm plot DIR --field x_TMA"]),
+        (["theta_OAl(CH3)2"], 0, ["coverage of OAl(CH3)2", "mpm plot DIR --field 'theta_OAl(CH3)2'"]),
+        (["velocity_lab"], 0, ["unit        m/s, shown in cm/s", "found in    phases.pvd (output.phases)"]),
         (["nonsense"], 2, ["a dotted key such as motion.gamma, or a table: geometry"]),
     ],
 )  # fmt: skip

@@ -27,13 +27,13 @@ def test_descriptions_keep_what_is_accepted_and_what_stands_in() -> None:
 
 @pytest.mark.parametrize("key", [key for key in all_keys() if not key.is_table], ids=lambda key: key.name)
 def test_defaults_and_examples_are_toml(key: Key) -> None:
-    """Fails when what `mpm explain` shows cannot be written into a file, or is of another dimension."""
+    """Fails when what `mpm explain` shows cannot be written into a file, is of another dimension, or a key has no example."""
     for text in (key.default, key.example):
         value = tomllib.loads(f"x = {text}")["x"] if text else None
         if key.unit and isinstance(value, str):
             parse(value, key.unit)
     assert key.description and key.kind
-    assert key.default_text
+    assert key.default_text and key.example
     assert all(find_key(other) for other in key.related)
 
 

@@ -51,7 +51,7 @@ def explain(
         str | None,
         typer.Argument(
             metavar="KEY",
-            help="a key of a case file, a table, or a reported number",
+            help="a key of a case file, a table, a reported number or a field",
             autocompletion=complete_key,
         ),
     ] = None,
@@ -64,6 +64,7 @@ def explain(
     mpm explain motion                             a table and its keys
     mpm explain geometry.inlet.tma.velocity        a key; its last part is enough: velocity
     mpm explain titration.tma.exit_mean            a number of summary.json
+    mpm explain x_TMA                              a field of fields.pvd
     """
     from mpm.explain import explain as explained
     from mpm.explain import overview
