@@ -87,4 +87,4 @@ def _powder_notes(case: Case) -> list[str]:
     if not missing:
         return []
     keys = " and ".join(f"material.{bed.material_name}.{key}" for key in missing)
-    return [f"no minimum fluidisation can be given: {keys} is missing"]
+    return [f"no minimum fluidisation can be given: {keys} {'are' if ' and ' in keys else 'is'} missing"]

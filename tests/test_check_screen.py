@@ -83,7 +83,7 @@ def test_what_is_silent_is_said() -> None:
         "5736 sccm/m",
         "at 0 degC and 101325 Pa",
         "Knudsen number of the pores",
-        "material.sand.density and material.sand.particle_diameter is missing",
+        "material.sand.density and material.sand.particle_diameter are missing",
         "molecules per passing site",
     ):
         assert part in text, part

@@ -12,7 +12,9 @@ import pytest
 from mpm.case import load_case
 from mpm.cli import main
 from mpm.errors import ConvergenceError, InputError
-from mpm.optimise import doses_of, optimise
+from mpm.optimise import Point, Search, doses_of, optimise
+from mpm.screen import screen
+from mpm.searchscreen import print_point
 
 from .cases import CASES, TINY, cycle, run, zone
 
@@ -71,6 +73,14 @@ def test_both_zones_through_the_command_line(tmp_path: Path, capsys: pytest.Capt
         ratio, excess = float(last[f"dose_ratio.{inlet}"]), float(last[f"excess_number.{inlet}"])
         assert f"dose ratio {ratio:.4g} ({excess:.4g} molecules per site)" in told
     assert f"mpm run {tmp_path}/case.toml" in told and "umol/m/s" in told
+
+
+def test_a_coverage_a_little_below_the_target_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when a coverage below the target counts as reaching it and nothing says why."""
+    search = Search(zone(mesh=TINY), doses_of(zone(mesh=TINY), 0.99, False), 0.99, 10.0)
+    for share, said in ((0.9898, "too lean"), (0.98995, "reaches it to 0.0001"), (0.9901, "reaches it")):
+        print_point(search, Point({}, {"tma": share}, {"tma": 1.0}, {"tma": 1.0}, 1.0, 0.0), screen())
+        assert " ".join(capsys.readouterr().out.split()).endswith(f"; {said}")
 
 
 def test_velocities_are_doses_too() -> None:

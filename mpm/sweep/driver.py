@@ -7,6 +7,7 @@ verdicts. Killing the driver at any moment therefore loses nothing, and the next
 import contextlib
 import os
 import queue
+import shlex
 import signal
 import sys
 import threading
@@ -20,6 +21,8 @@ from typing import Any
 from mpm.checks import check_case
 from mpm.errors import InputError
 from mpm.files import lock, write_atomically
+from mpm.nextsteps import print_steps
+from mpm.screen import screen
 from mpm.sweep.board import Board, now, say
 from mpm.sweep.cluster import Pool, PoolLost, open_pool
 from mpm.sweep.layout import Layout, read_json
@@ -202,6 +205,11 @@ def _drive(
     for name in results.missing_columns():
         say(f"no finished point reports {name}")
     draw(layout.root)
+    if counts["done"]:
+        root = layout.root
+        shown = root.relative_to(Path.cwd()) if root.is_relative_to(Path.cwd()) else root
+        steps = [(f"mpm report {shlex.quote(str(shown))}", "maps on one page, whose points open their runs")]
+        print_steps(steps, screen(stderr=True))
     settled = counts["done"] + counts["failed"] + counts["bad_input"]
     return 0 if counts["done"] and settled == len(results.points) else INCOMPLETE
 

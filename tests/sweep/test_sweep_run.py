@@ -25,6 +25,7 @@ def test_forty_points_two_at_a_time(bench):
     assert list(table.gamma) == [gamma for gamma in gammas for _ in SPEEDS]
     assert np.array_equal(table["titration.tma.exit_mean"], table.gamma * table.speed)
     assert "0 running" in messages and "40 done" in messages and " left" in messages
+    assert messages.splitlines()[-2] == "Next:" and "mpm report" in messages.splitlines()[-1]
 
 
 def test_failures_are_rows_and_stop_nothing(bench):
