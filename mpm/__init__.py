@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from mpm.errors import Interrupted as Interrupted
     from mpm.errors import MpmError as MpmError
     from mpm.geometry import Grid as Grid
-    from mpm.interactive import check as check
-    from mpm.interactive import plot as plot
     from mpm.reactor import Reactor as Reactor
-    from mpm.results import load_run as load_run
+    from mpm.session import check as check
+    from mpm.session import load_run as load_run
+    from mpm.session import plot as plot
     from mpm.sweep import load_sweep as load_sweep
 
 _HOME = {
@@ -34,9 +34,9 @@ _HOME = {
     "MpmError": "mpm.errors",
     "Grid": "mpm.geometry",
     "Reactor": "mpm.reactor",
-    "check": "mpm.interactive",
-    "plot": "mpm.interactive",
-    "load_run": "mpm.results",
+    "check": "mpm.session",
+    "plot": "mpm.session",
+    "load_run": "mpm.session",
     "load_sweep": "mpm.sweep",
 }
 __all__ = list(_HOME)

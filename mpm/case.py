@@ -274,7 +274,7 @@ class Case(Frozen):
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        from mpm.notebook import case_html
+        from mpm.casehtml import case_html
 
         return case_html(self)
 

@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mpm.errors import InputError
-from mpm.notebook import result_html
+from mpm.figures import figure_of
+from mpm.page import report
 from mpm.parallel import on_root
+from mpm.resulthtml import result_html
 from mpm.results import LastInstant, Run, load_run
 from mpm.verdict import verdict
 
@@ -35,7 +37,7 @@ class Result:
 
         On one process. Raises InputError for a name that is not there, with the nearest.
         """
-        return self._run().plot(name, **options)
+        return figure_of(self._run(), name, **options)
 
     def _run(self) -> Run:
         """This run as its directory holds it, or without one its last instant."""
@@ -61,6 +63,4 @@ class Result:
         directory = self.directory
         if directory is None:
             raise InputError("report: this run has no directory; accepted: a result of run(output=...)")
-        from mpm.page import report
-
         return on_root(self._comm, lambda: report(directory, output))

@@ -18,8 +18,6 @@ from mpm.output import RunDirectory
 from mpm.vtu import Snapshot, grid_points, grid_quads
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from mpm.case import Inlet
 
 Floats = NDArray[np.float64]
@@ -67,33 +65,6 @@ class Run:
         values = snapshot.cell_data[name].astype(float)
         shape = (self.grid.rows, self.grid.columns)
         return values.reshape(shape) if values.ndim == 1 else values[:, :2].reshape(*shape, 2)
-
-    def plot(self, name: str | None = None, **options: Any) -> Figure:
-        """A picture: of a field at the last stored time or the one nearest to `time` [s] (with `clim`, `streamlines` as `mpm plot` has
-        them), by default the coverage; one of the standard pictures (`history`, `outlets`, ...); or a number of the history over time.
-
-        `theta`, `x`, `C` alone are those of the first dosing inlet. Raises InputError for another name, with the nearest.
-        """
-        from mpm.interactive import figure_of
-
-        return figure_of(self, name, **options)
-
-    def __repr__(self) -> str:
-        from mpm.verdict import verdict
-
-        said = verdict(self.case, self.summary) if self.summary else "not ended yet"
-        return f"Run {self.directory.path}: {said}"
-
-    def _repr_html_(self) -> str:
-        from mpm.notebook import result_html
-
-        return result_html(self.case, self.summary, str(self.directory.path))
-
-    def report(self, output: str | Path | None = None) -> Path:
-        """Write one page with everything about this run (`mpm report`), by default its `report.html`; returns its path."""
-        from mpm.page import report
-
-        return report(self.directory.path, output)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

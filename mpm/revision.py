@@ -27,7 +27,18 @@ WITHOUT_NUMBERS = (
     *("drawing.py", "beside.py", "movie.py"),
     *("streamlines.py", "optimise.py", "revision.py"),
     *("watch.py", "kinds.py", "rundirs.py", "searchscreen.py"),
-    *("paraview.py", "notebook.py", "interactive.py", "result.py"),
+    *(
+        "paraview.py",
+        "notebook.py",
+        "session.py",
+        "figures.py",
+        "markup.py",
+        "casehtml.py",
+        "resulthtml.py",
+        "help.py",
+        "following.py",
+        "result.py",
+    ),
 )
 """Parts of the package that change no number of a run: sweeps, particles, the command line, warnings, pictures."""
 PATIENCE = 5.0

@@ -2,68 +2,25 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
-from fnmatch import fnmatch
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpm.case import load_case
-from mpm.errors import ConvergenceError, InputError, Interrupted
-from mpm.files import locked, read_text
-from mpm.history import read_table
+from mpm.errors import ConvergenceError, Interrupted
+from mpm.files import locked
+from mpm.following import look
 from mpm.nextsteps import print_end, print_steps
 from mpm.output import FAILED, RunDirectory
-from mpm.quantities import quantity
-from mpm.screen import duration, lines_of, say
-from mpm.tables import print_summary, shown
+from mpm.screen import lines_of, say
+from mpm.tables import print_summary
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-SHOWN = ("titration.*.exit_mean", "titration.*.box_mean", "cvd.rate_mean")
-"""Numbers of the history that one follows a run by."""
 LIVE, PIPED = 0.5, 5.0
 """Seconds between two looks, on a terminal and elsewhere."""
-_STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ (.*)")
-
-
-@dataclass(frozen=True)
-class Look:
-    """A run at one moment: the last `line` of its log, which is `age` [s] old, and the `numbers` of its latest output."""
-
-    line: str
-    age: float
-    numbers: Mapping[str, float]
-
-    def text(self) -> list[str]:
-        """What a person reads: how far it is, then a number each."""
-        ago = f" ({duration(self.age)} ago)" if self.age >= 2.0 else ""
-        names = [name for pattern in SHOWN for name in self.numbers if fnmatch(name, pattern)]
-        numbers = dict(self.numbers)
-        return [
-            self.line + ago,
-            *(f"{quantity(name).label}: {shown(name, numbers, False)}" for name in names),
-        ]
-
-
-def look(path: Path) -> Look:
-    """What the files of a run in `path` say now. Whatever is just being written counts as not there."""
-    log = RunDirectory(path).log
-    try:
-        lines = [match[1] for line in read_text(log).splitlines() if (match := _STAMP.fullmatch(line))]
-        age = time.time() - log.stat().st_mtime
-    except (OSError, ValueError):
-        lines, age = [], 0.0
-    try:
-        rows = read_table(path / "history.csv")
-    except (OSError, InputError):
-        rows = []
-    told = [line for line in lines if not line.startswith("warning")]
-    return Look(told[-1] if told else "starting", max(age, 0.0), rows[-1] if rows else {})
 
 
 def watch_run(path: Path, once: bool, console: Console) -> None:

@@ -13,8 +13,8 @@ import pytest
 import typer
 
 from mpm.cli import base, main
-from mpm.cli.help import example_of
 from mpm.dem.cli import app as dem_app
+from mpm.help import example_of
 
 
 def verbs() -> Iterator[tuple[str, Any]]:

@@ -13,11 +13,11 @@ import pytest
 from matplotlib.figure import Figure
 
 import mpm
+from mpm import load_run
 from mpm.case import Case
 from mpm.errors import InputError
 from mpm.quantities import flatten, quantity
 from mpm.reactor import Reactor, Result
-from mpm.results import load_run
 from mpm.tables import shown
 
 from .cases import MPI, SHORT, TINY, zone

@@ -13,9 +13,9 @@ from mpm import watch
 from mpm.cli import main
 from mpm.errors import ConvergenceError
 from mpm.files import locked
+from mpm.following import look
 from mpm.output import RunDirectory
 from mpm.reactor import Reactor
-from mpm.watch import look
 
 from mpi4py import MPI  # isort: skip  (after mpm.reactor, which loads the finite-element stack)
 

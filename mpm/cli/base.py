@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from mpm.cli.complete import complete_case, complete_run, complete_setting
-from mpm.cli.help import HELP_NAMES, App, Verbs
+from mpm.help import HELP_NAMES, App, Verbs
 from mpm.launcher import rank
 
 app = App(

@@ -20,8 +20,8 @@ from typing import Any, NoReturn
 import typer
 
 from mpm.cli.base import app
-from mpm.cli.help import missing
 from mpm.errors import InputError, Interrupted, MpmError, printable, storage_error
+from mpm.help import missing
 from mpm.launcher import rank
 from mpm.screen import say, screen, spell_out
 

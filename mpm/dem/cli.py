@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar
 
 import typer
 
-from mpm.cli.help import HELP_NAMES, App, Verbs
 from mpm.errors import InputError
+from mpm.help import HELP_NAMES, App, Verbs
 from mpm.kinds import DEM_RUN, kind_of_directory, what_it_is
 from mpm.launcher import rank
 from mpm.screen import screen

@@ -9,6 +9,7 @@ from typing import Any
 
 from mpm.checks import check_case
 from mpm.checkscreen import case_sheet
+from mpm.following import look
 from mpm.keys import values
 from mpm.marks import MARKS, Marked
 from mpm.page.curves import Chart, curves
@@ -19,7 +20,6 @@ from mpm.page.write import render
 from mpm.results import Run, load_run
 from mpm.screen import HARD_SPACE, Listing, entry
 from mpm.verdict import verdict
-from mpm.watch import look
 
 
 @dataclass(frozen=True)
