@@ -12,28 +12,28 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mpm.case import Case as Case
-    from mpm.case import load_case as load_case
+    from mpm.case.case import Case as Case
+    from mpm.case.case import load_case as load_case
     from mpm.errors import ConvergenceError as ConvergenceError
     from mpm.errors import InputError as InputError
     from mpm.errors import Interrupted as Interrupted
     from mpm.errors import MpmError as MpmError
-    from mpm.geometry import Grid as Grid
-    from mpm.reactor import Reactor as Reactor
+    from mpm.mesh.grid import Grid as Grid
+    from mpm.reactor.reactor import Reactor as Reactor
     from mpm.session import check as check
     from mpm.session import load_run as load_run
     from mpm.session import plot as plot
     from mpm.sweep import load_sweep as load_sweep
 
 _HOME = {
-    "Case": "mpm.case",
-    "load_case": "mpm.case",
+    "Case": "mpm.case.case",
+    "load_case": "mpm.case.case",
     "ConvergenceError": "mpm.errors",
     "InputError": "mpm.errors",
     "Interrupted": "mpm.errors",
     "MpmError": "mpm.errors",
-    "Grid": "mpm.geometry",
-    "Reactor": "mpm.reactor",
+    "Grid": "mpm.mesh.grid",
+    "Reactor": "mpm.reactor.reactor",
     "check": "mpm.session",
     "plot": "mpm.session",
     "load_run": "mpm.session",

@@ -24,16 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from mpm.engineering import inlet_excess
+from mpm.advice.engineering import inlet_excess
+from mpm.case.kinds import SEARCH, kind_of_directory, what_it_is
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
-from mpm.kinds import SEARCH, kind_of_directory, what_it_is
-from mpm.reactor import Reactor
-from mpm.replay import Replay
+from mpm.reactor.reactor import Reactor
+from mpm.reactor.sequence import Replay
 
 if TYPE_CHECKING:
-    from mpm.case import Case
-    from mpm.layout import Inlet
+    from mpm.case.case import Case
+    from mpm.case.geometry import Inlet
 
 log = logging.getLogger("mpm")
 RICHEST, LEANEST = 0.02, 1e-6  # mass fractions: dilute gas above, nothing happens below

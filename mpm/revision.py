@@ -10,35 +10,37 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parent
 WITHOUT_NUMBERS = (
-    *("sweep", "dem", "cases", "cli", "page"),
+    *("sweep", "dem", "cases", "cli", "page", "pictures", "guide"),
     *(
-        "launcher.py",
-        "settings.py",
-        "screen.py",
-        "tables.py",
-        "checkscreen.py",
-        "marks.py",
-        "notes.py",
-        "sketch.py",
-        "nextsteps.py",
-    ),
-    *("caveats.py", "idle.py", "quantities.py", "keys.py", "schema.py", "verdict.py", "compare.py"),
-    *("results.py", "pictures.py", "maps.py", "outline.py", "curves.py", "labels.py", "fieldnames.py"),
-    *("drawing.py", "beside.py", "movie.py"),
-    *("streamlines.py", "optimise.py", "revision.py"),
-    *("watch.py", "kinds.py", "rundirs.py", "searchscreen.py"),
-    *(
-        "paraview.py",
-        "notebook.py",
-        "session.py",
-        "figures.py",
-        "markup.py",
-        "casehtml.py",
-        "resulthtml.py",
+        "drawing.py",
         "help.py",
-        "following.py",
-        "result.py",
+        "labels.py",
+        "launcher.py",
+        "markup.py",
+        "optimise.py",
+        "revision.py",
+        "screen.py",
+        "session.py",
     ),
+    *("advice/caveats.py", "advice/idle.py", "advice/notes.py", "advice/sketch.py", "advice/screen.py"),
+    *(
+        "report/quantities.py",
+        "report/fieldnames.py",
+        "report/tables.py",
+        "report/verdict.py",
+        "report/notebook.py",
+    ),
+    *(
+        "case/keys.py",
+        "case/keytable.py",
+        "case/schema.py",
+        "case/kinds.py",
+        "case/marks.py",
+        "case/notebook.py",
+        "case/settings.py",
+    ),
+    *("output/results.py", "output/rundirs.py", "output/following.py", "output/compare.py"),
+    *("reactor/result.py", "reactor/notebook.py"),
 )
 """Parts of the package that change no number of a run: sweeps, particles, the command line, warnings, pictures."""
 PATIENCE = 5.0
@@ -51,7 +53,7 @@ def digest() -> str:
     found = hashlib.sha256()
     for file in sorted((*PACKAGE.rglob("*.py"), *PACKAGE.rglob("*.toml"))):
         where = file.relative_to(PACKAGE)
-        if where.parts[0] not in WITHOUT_NUMBERS:
+        if not {where.parts[0], str(where)} & set(WITHOUT_NUMBERS):
             found.update(f"{where}\0".encode() + file.read_bytes())
     return found.hexdigest()[:8]
 

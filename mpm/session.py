@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from mpm import results
-from mpm.case import Case, load_case
-from mpm.checks import check_case
-from mpm.checkscreen import case_sheet, print_report
+from mpm.advice.checks import check_case
+from mpm.advice.screen import case_sheet, print_report
+from mpm.advice.sketch import sketch
+from mpm.case.case import Case, load_case
+from mpm.case.marks import Marked
 from mpm.errors import InputError
-from mpm.marks import Marked
 from mpm.markup import columns, escape, items, paragraph, table, text
-from mpm.resulthtml import result_html
+from mpm.output import results
+from mpm.report.notebook import result_html
+from mpm.report.verdict import verdict
 from mpm.screen import Listing, screen
-from mpm.sketch import sketch
-from mpm.verdict import verdict
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -149,7 +149,7 @@ class Run(results.Run):
 
         `theta`, `x`, `C` alone are those of the first dosing inlet. Raises InputError for another name, with the nearest.
         """
-        from mpm.figures import figure_of
+        from mpm.pictures.figures import figure_of
 
         return figure_of(self, name, **options)
 

@@ -25,9 +25,9 @@ def worker(name: str, fidelity: str, seconds: float) -> None:
     import time
 
     from mpm import Reactor, load_case
-    from mpm.cycle import mean_motion
-    from mpm.flow import FlowProblem
-    from mpm.motion import REST
+    from mpm.flow.cycle import mean_motion
+    from mpm.flow.problem import FlowProblem
+    from mpm.motion.kinematics import REST
     from mpm.parallel import largest, total
 
     changes: dict[str, object] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mpm.keys import Key, all_keys, keys_of
+from mpm.case.keys import Key, all_keys, keys_of
 
 HEAD = """\
 # The case file

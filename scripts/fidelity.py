@@ -20,9 +20,9 @@ from document import write_between
 
 from mpm import Reactor, load_case
 from mpm.parallel import is_root
-from mpm.replay import Replay
+from mpm.reactor.sequence import Replay
 
-from mpi4py import MPI  # isort: skip  (after mpm.fem)
+from mpi4py import MPI  # isort: skip  (after mpm.numerics.fem)
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "results" / "fidelity"

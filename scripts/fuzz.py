@@ -27,16 +27,16 @@ from typing import Any
 import tomli_w
 from rich.console import Console
 
-from mpm.case import load_case
-from mpm.caseio import built_in_files
-from mpm.checks import check_case
-from mpm.checkscreen import print_report
+from mpm.advice.checks import check_case
+from mpm.advice.screen import print_report
+from mpm.case.case import load_case
+from mpm.case.marks import print_full
+from mpm.case.sources import built_in_files
 from mpm.dem.case import load_case as load_powder
 from mpm.errors import InputError
-from mpm.marks import print_full
+from mpm.report.tables import print_mesh
 from mpm.sweep.plan import combinations, plan
 from mpm.sweep.sweepfile import read_sweep
-from mpm.tables import print_mesh
 
 ROOT = Path(__file__).parents[1]
 FEW_POINTS = 8

@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 import psutil
 
-from mpm.case import Case, load_case
-from mpm.history import History
+from mpm.case.case import Case, load_case
+from mpm.output.history import History
 
 ROOT = Path(__file__).parents[1]
 TOLERANCE = 1e-10  # of the largest value of a column; balances, which are rounding, absolute

@@ -21,9 +21,9 @@ import numpy as np
 from document import write_between
 
 from mpm import Reactor, load_case
-from mpm.dispersion import vibrational_dispersion
-from mpm.motion import BedMotion
-from mpm.strip import Strip
+from mpm.mesh.strip import Strip
+from mpm.motion.kinematics import BedMotion
+from mpm.transport.dispersion import vibrational_dispersion
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "results" / "open_question"

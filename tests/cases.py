@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-import mpm.fem  # noqa: F401  (loads the finite-element stack before mpi4py)
-from mpm.balances import element_balances, site_balance, species_balances
-from mpm.case import Case, load_case
-from mpm.flow import boundary_flows, face_flow
+import mpm.numerics.fem  # noqa: F401  (loads the finite-element stack before mpi4py)
+from mpm.case.case import Case, load_case
+from mpm.flow.problem import boundary_flows, face_flow
+from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP
 from mpm.parallel import largest
-from mpm.reactor import Reactor, Result
-from mpm.strip import BOTTOM, LEFT, RIGHT, TOP
+from mpm.reactor.reactor import Reactor, Result
+from mpm.report.balances import element_balances, site_balance, species_balances
 
-from mpi4py import MPI  # isort: skip  (after mpm.fem)
+from mpi4py import MPI  # isort: skip  (after mpm.numerics.fem)
 
 CASES = Path(__file__).parents[1] / "cases"
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpm.balances import worst_balance
 from mpm.cli import main
-from mpm.diagnostics import Totals
 from mpm.errors import BalanceError
-from mpm.output import RunDirectory
-from mpm.reactor import Reactor
-from mpm.transport import Transport
+from mpm.output.directory import RunDirectory
+from mpm.reactor.reactor import Reactor
+from mpm.report.balances import worst_balance
+from mpm.report.coating import Totals
+from mpm.transport.species import Transport
 
 from .cases import CASES, MPI, SHORT, TINY, assert_same_numbers, physical_numbers, zone
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mpm.bed import MEMORY, Bed
-from mpm.motion import BedMotion, step_motion
+from mpm.mesh.strip import Strip
+from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.parallel import total
-from mpm.strip import Strip
+from mpm.transport.coverage import MEMORY, Bed
 
 from .cases import MPI, TINY, zone
 

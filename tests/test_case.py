@@ -14,10 +14,10 @@ from typing import Any
 import jsonschema
 import pytest
 
-from mpm.case import Case, case_schema, load_case
-from mpm.caseio import built_in_files
+from mpm.case.case import Case, case_schema, load_case
+from mpm.case.sources import built_in_files
 from mpm.errors import InputError
-from mpm.geometry import Grid
+from mpm.mesh.grid import Grid
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE / "example_case.toml"
@@ -388,7 +388,7 @@ def test_a_case_is_frozen(case: Case) -> None:
 def test_reading_a_case_loads_no_solver() -> None:
     """Fails when mpm, the case, the grid or the command line import MPI, PETSc, dolfinx, gmsh or LAMMPS."""
     code = (
-        "import sys, mpm, mpm.case, mpm.geometry, mpm.cli, mpm.checks\n"
+        "import sys, mpm, mpm.case.case, mpm.mesh.grid, mpm.cli, mpm.advice.checks\n"
         "mpm.load_case('single_zone')\n"
         "heavy = {'dolfinx', 'dolfinx_solver', 'mpi4py', 'petsc4py', 'gmsh', 'pyvista', 'lammps'}\n"
         "print(sorted(heavy & set(sys.modules)))"

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from mpm.case import Case, load_case
-from mpm.checks import check_case
-from mpm.checkscreen import print_report
+from mpm.advice.checks import check_case
+from mpm.advice.notes import notes, sites_per_square_nanometre, standard_flow
+from mpm.advice.screen import print_report
+from mpm.case.case import Case, load_case
+from mpm.case.marks import print_full
 from mpm.cli import main
-from mpm.marks import print_full
-from mpm.nextsteps import print_steps
-from mpm.notes import notes, sites_per_square_nanometre, standard_flow
+from mpm.cli.nextsteps import print_steps
 
 from .test_screen import text_of
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from pydantic_core import PydanticCustomError
 
-from mpm.case import Case, load_case
-from mpm.chemistry import mole_fractions
-from mpm.elements import parse_formula
-from mpm.equation import parse_equation
+from mpm.case.case import Case, load_case
 from mpm.errors import InputError
+from mpm.physics.elements import parse_formula
+from mpm.physics.equation import parse_equation
+from mpm.physics.mechanism import mole_fractions
 
 EXAMPLE = Path(__file__).parent / "example_case.toml"
 R = 8.31446261815324

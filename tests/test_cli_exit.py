@@ -53,7 +53,7 @@ def test_each_error_has_its_status_and_one_line(
     def schema() -> None:
         raise error
 
-    monkeypatch.setattr("mpm.case.case_schema", schema)
+    monkeypatch.setattr("mpm.case.case.case_schema", schema)
     assert program.main(["schema"]) == status
     out, err = capsys.readouterr()
     assert out == ""
@@ -67,7 +67,7 @@ def test_a_defect_shows_where_it_is(
     def schema() -> None:
         raise ZeroDivisionError("a defect")
 
-    monkeypatch.setattr("mpm.case.case_schema", schema)
+    monkeypatch.setattr("mpm.case.case.case_schema", schema)
     with pytest.raises(SystemExit, match="1"):
         program.main(["schema"])
     assert "Traceback" in capsys.readouterr().err
@@ -75,7 +75,7 @@ def test_a_defect_shows_where_it_is(
 
 def test_sigterm_ends_like_ctrl_c(monkeypatch: pytest.MonkeyPatch) -> None:
     before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr("mpm.case.case_schema", lambda: os.kill(os.getpid(), signal.SIGTERM))
+    monkeypatch.setattr("mpm.case.case.case_schema", lambda: os.kill(os.getpid(), signal.SIGTERM))
     assert program.main(["schema"]) == 130
     assert signal.getsignal(signal.SIGTERM) is before
 

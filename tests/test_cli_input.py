@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from mpm.caseio import built_in_files
+from mpm.case.settings import parse_settings
+from mpm.case.sources import built_in_files
 from mpm.cli import main
 from mpm.dem.case import load_case as load_powder
-from mpm.settings import parse_settings
 from mpm.sweep.sweepfile import read_sweep
 
 PROFILE = "phase_deg,u_x_m/s,u_y_m/s,contact\n0,0.01,0,1\n90,0.02,0,1\n180,0.01,0,0\n270,0.0,0,0\n"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mpm.case import load_case
+from mpm.case.case import load_case
 from mpm.cli import main
-from mpm.rundirs import make_numbered
+from mpm.output.rundirs import make_numbered
 
 from .cases import CASES, TINY, assert_same_numbers, zone
 

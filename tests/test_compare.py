@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from mpm.case import Case
+from mpm.case.case import Case
 from mpm.cli import main
-from mpm.compare import changed_keys, changed_numbers
-from mpm.output import RunDirectory
+from mpm.output.compare import changed_keys, changed_numbers
+from mpm.output.directory import RunDirectory
 
 from .cases import TINY, zone
 

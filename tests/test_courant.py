@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpm.courant import courant_number, driving_speed
 from mpm.errors import ConvergenceError
-from mpm.output import RunDirectory
-from mpm.reactor import Reactor
-from mpm.strip import Strip
-from mpm.vtu import read_pvd, read_vtu
+from mpm.flow.courant import courant_number, driving_speed
+from mpm.mesh.strip import Strip
+from mpm.output.directory import RunDirectory
+from mpm.output.vtu import read_pvd, read_vtu
+from mpm.reactor.reactor import Reactor
 
 from .cases import MPI, TINY, column_case, run, zone
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpm.case import Case, load_case
-from mpm.reactor import Reactor, Result
+from mpm.case.case import Case, load_case
+from mpm.reactor.reactor import Reactor, Result
 
 ROOT = Path(__file__).parents[1]
 COARSE = {

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpm.case import load_case
+from mpm.case.case import load_case
 from mpm.cli import main
-from mpm.motion import BedMotion
+from mpm.motion.kinematics import BedMotion
 
 pytestmark = pytest.mark.lammps
 

@@ -9,6 +9,7 @@ import tomllib
 import numpy as np
 import pytest
 
+from mpm.case.profile import read_profile
 from mpm.dem import analysis
 from mpm.dem.base import FLAT, frit_monolayer, loose_filling, sawtooth_baffle, tooth_area
 from mpm.dem.case import load_case
@@ -18,7 +19,6 @@ from mpm.dem.profile import Profile, conditions, piecewise_fit, scaled_to_mean
 from mpm.dem.waveform import Sawtooth, sine
 from mpm.errors import InputError
 from mpm.physics.fluidisation import minimum_fluidisation_velocity
-from mpm.profile import read_profile
 
 WAVE = sine(0.3, 16.0, math.radians(60))
 N = 128

@@ -12,8 +12,8 @@ from mpm.dem.contact import Contact
 from mpm.dem.powder import POWDERS
 from mpm.dem.simulate import build
 from mpm.errors import InputError
-from mpm.gases import ideal_gas_density
 from mpm.physics import conveying, fluidisation
+from mpm.physics.gases import ideal_gas_density
 
 AIR = ideal_gas_density(101325.0, 29e-3, 293.15)
 MU = 18e-6

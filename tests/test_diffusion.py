@@ -2,9 +2,9 @@
 
 import pytest
 
-from mpm.case import Case, load_case
-from mpm.diffusion import carrier_ratio, diffusion_volume
-from mpm.elements import parse_formula
+from mpm.case.case import Case, load_case
+from mpm.physics.diffusion import carrier_ratio, diffusion_volume
+from mpm.physics.elements import parse_formula
 
 
 def gas_case(**gas: object) -> Case:

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpm.bed import Bed
-from mpm.case import Case
-from mpm.curves import exits
-from mpm.geometry import Grid
-from mpm.outline import way
+from mpm.case.case import Case
+from mpm.mesh.grid import Grid
+from mpm.mesh.strip import Strip
+from mpm.motion.schedule import Schedule
+from mpm.output.results import load_run
 from mpm.parallel import on_root
-from mpm.reactor import Reactor
-from mpm.results import load_run
-from mpm.schedule import Schedule
-from mpm.strip import Strip
+from mpm.pictures.curves import exits
+from mpm.pictures.outline import way
+from mpm.reactor.reactor import Reactor
+from mpm.transport.coverage import Bed
 
 from .cases import MPI, SHORT, TINY, assert_same_numbers, cycle, run, zone
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from mpm.constants import GRAVITY
-from mpm.cycle import periodic_flow
-from mpm.dispersion import dispersion_tensor, vibrational_dispersion
 from mpm.errors import InputError
-from mpm.flow import FlowProblem
-from mpm.motion import BedMotion
-from mpm.reactor import Reactor
-from mpm.strip import Strip
+from mpm.flow.cycle import periodic_flow
+from mpm.flow.problem import FlowProblem
+from mpm.mesh.strip import Strip
+from mpm.motion.kinematics import BedMotion
+from mpm.reactor.reactor import Reactor
+from mpm.transport.dispersion import dispersion_tensor, vibrational_dispersion
 
 from .cases import MPI, SHORT, TINY, assert_same_numbers, rate, run, strip_case, zone
 

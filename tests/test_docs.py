@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpm.case import load_case
-from mpm.checks import check_case
+from mpm.advice.checks import check_case
+from mpm.case.case import load_case
+from mpm.case.settings import parse_settings
 from mpm.cli import main
-from mpm.geometry import Grid
-from mpm.output import RunDirectory
-from mpm.settings import parse_settings
+from mpm.mesh.grid import Grid
+from mpm.output.directory import RunDirectory
 
 from .cases import TINY
 

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from mpm.case import load_case
-from mpm.caseio import built_in_files
+from mpm.case.case import load_case
+from mpm.case.keys import all_keys
+from mpm.case.materials import BUILT_IN
+from mpm.case.names import POWDER_FILES, SWEEP_FILES
+from mpm.case.sources import built_in_files
 from mpm.cli import main
 from mpm.dem.case import load_case as load_powder
-from mpm.gases import CARRIERS
-from mpm.keys import all_keys
-from mpm.materials import BUILT_IN
-from mpm.names import POWDER_FILES, SWEEP_FILES
-from mpm.newcase import SCHEMA_FILE, WIDTH, new_case
-from mpm.quantities import QUANTITIES
+from mpm.guide.newcase import SCHEMA_FILE, WIDTH, new_case
+from mpm.physics.gases import CARRIERS
+from mpm.report.quantities import QUANTITIES
 from mpm.sweep.sweepfile import read_sweep
 
 ROOT = Path(__file__).parent.parent
@@ -263,7 +263,7 @@ def test_settings_in_the_explanations_are_accepted(capsys: pytest.CaptureFixture
     """Fails when `in a shell` shows a --set that the shell or a case would not take."""
     import shlex
 
-    from mpm.settings import parse_settings
+    from mpm.case.settings import parse_settings
 
     tried, phases = (
         0,

@@ -10,13 +10,13 @@ from matplotlib.collections import QuadMesh
 from PIL import Image
 from typer.testing import CliRunner
 
-from mpm.beside import beside_figure
-from mpm.case import load_case
+from mpm.case.case import load_case
 from mpm.cli.base import app
 from mpm.drawing import Wish, draw, parse_clim, parse_time
 from mpm.errors import InputError
-from mpm.maps import Map, limits_of
-from mpm.results import Run
+from mpm.output.results import Run
+from mpm.pictures.beside import beside_figure
+from mpm.pictures.maps import Map, limits_of
 from tests.test_plot import COVERAGE, TIMES, drawn, meshes, write_run
 
 COARSE = {"geometry.cell_width": "5 mm"}

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from mpm import engineering as eng
-from mpm.case import Case, load_case
-from mpm.checks import check_case
+from mpm.advice import engineering as eng
+from mpm.advice.checks import check_case
+from mpm.case.case import Case, load_case
 from mpm.cli import main
-from mpm.geometry import Grid
+from mpm.mesh.grid import Grid
 
 from .cases import COARSE
 

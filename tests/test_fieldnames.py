@@ -5,7 +5,15 @@ import pytest
 
 from mpm import Reactor, load_case
 from mpm.errors import InputError
-from mpm.fieldnames import FIELDS, Limits, colour_limits, drawable, field_name, field_values, superscript
+from mpm.report.fieldnames import (
+    FIELDS,
+    Limits,
+    colour_limits,
+    drawable,
+    field_name,
+    field_values,
+    superscript,
+)
 from tests.cases import COARSE
 
 VECTOR = np.array([[3.0, 4.0, 0.0], [0.0, -2.0, 0.0]])

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mpm.case import Case, load_case
-from mpm.cycle import cycle_motions, periodic_flow
-from mpm.flow import FlowProblem, boundary_flows, face_flow
-from mpm.flownumbers import flow_numbers, flux_profiles, pressure_drops
-from mpm.motion import REST, BedMotion, StepMotion
+from mpm.case.case import Case, load_case
+from mpm.flow.cycle import cycle_motions, periodic_flow
+from mpm.flow.numbers import flow_numbers, flux_profiles, pressure_drops
+from mpm.flow.problem import FlowProblem, boundary_flows, face_flow
+from mpm.flow.steady import steady_flow
+from mpm.mesh.strip import BOTTOM, LEFT, TOP, Strip
+from mpm.motion.kinematics import REST, BedMotion, StepMotion
 from mpm.parallel import largest
-from mpm.steadyflow import steady_flow
-from mpm.strip import BOTTOM, LEFT, TOP, Strip
 
 from .cases import MPI, TINY, column_case, norm, rate, strip_case, zone
 

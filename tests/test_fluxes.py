@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mpm.flow import FaceFlow
-from mpm.fluxes import FluxAssembler, FluxOperator, bernoulli, exponential_flux
-from mpm.strip import Strip
+from mpm.flow.problem import FaceFlow
+from mpm.mesh.strip import Strip
+from mpm.transport.fluxes import FluxAssembler, FluxOperator, bernoulli, exponential_flux
 
 from .cases import MPI, strip_case, zone
 

@@ -1,11 +1,11 @@
-"""Fronts, walks and amounts of `mpm.fronts` against profiles whose answer is known on paper; no solver."""
+"""Fronts, walks and amounts of `mpm.report.fronts` against profiles whose answer is known on paper; no solver."""
 
 import numpy as np
 import pytest
 
-from mpm.case import load_case
-from mpm.fronts import coverage_front, crossing, front, walk
-from mpm.geometry import Grid
+from mpm.case.case import load_case
+from mpm.mesh.grid import Grid
+from mpm.report.fronts import coverage_front, crossing, front, walk
 
 COARSE = {
     "geometry.cell_width": "2 mm",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mpm.case import load_case
+from mpm.case.case import load_case
 from mpm.errors import InputError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpm.geometry import Grid, row_heights
+from mpm.mesh.grid import Grid, row_heights
 
 from .cases import strip_case, zone
 

@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from mpm.case import load_case
-from mpm.checks import check_case
+from mpm.advice.checks import check_case
+from mpm.advice.idle import idle_keys
+from mpm.case.case import load_case
 from mpm.dem.case import load_case as load_powder
 from mpm.dem.idle import idle_keys as idle_in_powder
-from mpm.idle import idle_keys
 from mpm.sweep.sweepfile import read_sweep
 
 from .cases import SHORT, TINY, physical_numbers, run, zone

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from mpm.case import Case, case_schema, load_case
+from mpm.advice.idle import idle_keys
+from mpm.case.case import Case, case_schema, load_case
+from mpm.case.keys import READ_BY, Key, Value, all_keys, find_key, find_keys, keys_of, values
+from mpm.case.schema import for_people, number_text
 from mpm.errors import InputError
-from mpm.idle import idle_keys
-from mpm.keys import READ_BY, Key, Value, all_keys, find_key, find_keys, keys_of, values
-from mpm.schema import for_people, number_text
 from mpm.units import parse
 
 ROOT = Path(__file__).parent.parent

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mpm.case import load_case
-from mpm.chemistry import Mechanism, Site, Species, SurfaceReaction
-from mpm.kinetics import GasKinetics, Roles, SurfaceKinetics
+from mpm.case.case import load_case
+from mpm.physics.kinetics import GasKinetics, Roles, SurfaceKinetics
+from mpm.physics.mechanism import Mechanism, Site, Species, SurfaceReaction
 
 from .cases import CASES, rate
 

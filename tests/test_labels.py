@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from mpm.case import Case, load_case
+from mpm.case.case import Case, load_case
 from mpm.errors import InputError
 from mpm.files import file_name
 from mpm.labels import literal, xml_attribute
-from mpm.mesh import read_msh, write_msh
-from mpm.outline import formula
-from mpm.output import RunDirectory
-from mpm.vtu import encode_pvd, encode_vtu, grid_points, grid_quads, read_vtu
+from mpm.mesh.msh import read_msh, write_msh
+from mpm.output.directory import RunDirectory
+from mpm.output.vtu import encode_pvd, encode_vtu, grid_points, grid_quads, read_vtu
+from mpm.pictures.outline import formula
 
 NAMES = ['A"B', "A<B>&'C", "A/B", "OH[s]", "x,y;z", "$x$", "日本", "a\\b", "%20", "O2*"]
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from mpm.errors import InputError
-from mpm.geometry import Grid
-from mpm.mesh import build_mesh, read_msh, write_msh
+from mpm.mesh.grid import Grid
+from mpm.mesh.msh import build_mesh, read_msh, write_msh
+from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 from mpm.parallel import total
-from mpm.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 
 from .cases import COARSE, MPI, TINY, cycle, zone
 

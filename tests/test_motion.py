@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mpm.case import Motion
+from mpm.case.case import Motion
+from mpm.case.profile import read_profile
 from mpm.errors import InputError
-from mpm.motion import REST, TURN, BedMotion, Vibration, step_motion, thesis_phases
-from mpm.profile import read_profile
+from mpm.motion.kinematics import REST, TURN, BedMotion, Vibration, step_motion, thesis_phases
 
 # bed_velocity_reconstruction.csv of the project's reference numbers (classic conveyor theory, worked out without mpm, g = 9.81 m/s2):
 # Gamma, mean [cm/s], lift-off [deg], contact [deg], share of the cycle in flight, flight velocity, peak velocities x and y [m/s].

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mpm.case import load_case
+from mpm.case.case import load_case
 from mpm.cli import main
 from mpm.errors import nearest
 
@@ -88,7 +88,7 @@ def test_a_shared_geometry_is_meshed_by_name(folder: Path, capsys: pytest.Captur
 
 def test_paths_of_settings_are_relative_to_where_the_user_stands(folder: Path) -> None:
     """Fails when a profile, base or mechanism that shell completion has offered is looked for beside the case file."""
-    from mpm.settings import parse_settings
+    from mpm.case.settings import parse_settings
 
     (folder / "cases").mkdir()
     (folder / "here").mkdir()

@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 
 import mpm
 from mpm import load_run
-from mpm.case import Case
+from mpm.case.case import Case
 from mpm.errors import InputError
-from mpm.quantities import flatten, quantity
-from mpm.reactor import Reactor, Result
-from mpm.tables import shown
+from mpm.reactor.reactor import Reactor, Result
+from mpm.report.quantities import flatten, quantity
+from mpm.report.tables import shown
 
 from .cases import MPI, SHORT, TINY, zone
 
@@ -95,7 +95,7 @@ def test_check_prints_and_is_a_mapping(case: Case, monkeypatch: pytest.MonkeyPat
 
 def test_names_of_the_package_are_functions() -> None:
     """Fails when a module of the package takes the name of a function at its top level, which an import of it would then hide."""
-    for name in ("mpm.checks", "mpm.pictures", "mpm.drawing", "mpm.results"):
+    for name in ("mpm.advice.checks", "mpm.pictures.standard", "mpm.drawing", "mpm.output.results"):
         importlib.import_module(name)
     for name in ("check", "plot", "load_run", "load_sweep", "load_case"):
         assert importlib.util.find_spec(f"mpm.{name}") is None

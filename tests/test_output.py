@@ -16,9 +16,9 @@ import pytest
 
 from mpm.errors import ConvergenceError, InputError, MpmError
 from mpm.files import write_atomically
-from mpm.geometry import Grid
-from mpm.output import RunDirectory
-from mpm.vtu import read_pvd, read_vtu
+from mpm.mesh.grid import Grid
+from mpm.output.directory import RunDirectory
+from mpm.output.vtu import read_pvd, read_vtu
 
 COLUMNS, ROWS = 12, 5
 
@@ -312,8 +312,8 @@ def test_an_output_costs_the_same_however_many_there_are(
         replace(path, content)
 
     monkeypatch.setattr("os.pwrite", counted)
-    monkeypatch.setattr("mpm.history.write_atomically", counted_whole)
-    monkeypatch.setattr("mpm.vtu.write_atomically", counted_whole)
+    monkeypatch.setattr("mpm.output.history.write_atomically", counted_whole)
+    monkeypatch.setattr("mpm.output.vtu.write_atomically", counted_whole)
     costs = []
     for step in range(600):
         written = 0
@@ -332,7 +332,7 @@ def test_an_output_costs_the_same_however_many_there_are(
 def test_one_run_at_a_time(run: RunDirectory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails when a second run is let into a live directory, one whose run has ended or was killed stays closed, or a refusal leaves a
     file."""
-    monkeypatch.setattr("mpm.output.PATIENCE", 0.1)
+    monkeypatch.setattr("mpm.output.directory.PATIENCE", 0.1)
     run.prepare(resume=True)
     for way in ({"resume": True}, {"overwrite": True}):
         with pytest.raises(InputError, match="another run is at work"):
@@ -340,7 +340,7 @@ def test_one_run_at_a_time(run: RunDirectory, monkeypatch: pytest.MonkeyPatch) -
     assert len(run.history()["time"]) == len(TIMES)
     code = f"""
 import time
-from mpm.output import RunDirectory
+from mpm.output.directory import RunDirectory
 directory = RunDirectory({str(run.path)!r})
 directory.prepare(resume=True)
 print("in", flush=True)
@@ -376,8 +376,8 @@ def test_directory_in_use_is_refused_or_emptied(run: RunDirectory, tmp_path: Pat
 WRITER = """
 import sys
 import numpy as np
-from mpm.geometry import Grid
-from mpm.output import RunDirectory
+from mpm.mesh.grid import Grid
+from mpm.output.directory import RunDirectory
 grid = Grid(np.linspace(0, 1, 101), np.linspace(0, 1, 51), np.zeros(50, int), np.ones(100, int), ("bed",), True)
 directory = RunDirectory(sys.argv[1])
 directory.prepare()

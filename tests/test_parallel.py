@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mpm.case import Case
+from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.parallel import Scatter, on_root, total
-from mpm.reactor import Reactor
+from mpm.reactor.reactor import Reactor
 
 from .cases import MPI, SHORT, TINY, assert_same_numbers, cycle, run, zone
 

@@ -14,9 +14,9 @@ import pytest
 
 from mpm.cli import main
 from mpm.errors import InputError
-from mpm.output import RunDirectory
-from mpm.paraview import VIBRATION, VIEW, bar_labels, vertical_scale, write_scripts
-from mpm.reactor import Reactor
+from mpm.output.directory import RunDirectory
+from mpm.pictures.paraview import VIBRATION, VIEW, bar_labels, vertical_scale, write_scripts
+from mpm.reactor.reactor import Reactor
 
 from .cases import MPI, TINY, zone
 

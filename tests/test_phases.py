@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpm.case import Case
-from mpm.checks import check_case
+from mpm.advice.checks import check_case
+from mpm.advice.idle import idle_keys
+from mpm.case.case import Case
 from mpm.errors import InputError, Interrupted
-from mpm.geometry import Grid
-from mpm.idle import idle_keys
-from mpm.motion import BedMotion
-from mpm.output import RunDirectory
-from mpm.phases import LastCycle, phase_fields
-from mpm.reactor import Reactor
-from mpm.schedule import Schedule
-from mpm.vtu import Snapshot
+from mpm.mesh.grid import Grid
+from mpm.motion.kinematics import BedMotion
+from mpm.motion.schedule import Schedule
+from mpm.output.directory import RunDirectory
+from mpm.output.phases import LastCycle, phase_fields
+from mpm.output.vtu import Snapshot
+from mpm.reactor.reactor import Reactor
 
 from .cases import MPI, TINY, assert_same_numbers, zone
 

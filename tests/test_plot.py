@@ -15,16 +15,16 @@ from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from mpm.case import Case, load_case
-from mpm.curves import exit_profile_figure, history_figure, outlets_figure, profile_steps
+from mpm.case.case import Case, load_case
 from mpm.errors import InputError
 from mpm.files import file_name
-from mpm.geometry import Grid
-from mpm.maps import PLAIN, map_figure
-from mpm.outline import WIDTH, formula, spread
-from mpm.output import RunDirectory
-from mpm.pictures import Fields, draw_field, figures, plot_run
-from mpm.results import Run, dosing_inlets, fed_species, load_run, sites_made_by
+from mpm.mesh.grid import Grid
+from mpm.output.directory import RunDirectory
+from mpm.output.results import Run, dosing_inlets, fed_species, load_run, sites_made_by
+from mpm.pictures.curves import exit_profile_figure, history_figure, outlets_figure, profile_steps
+from mpm.pictures.maps import PLAIN, map_figure
+from mpm.pictures.outline import WIDTH, formula, spread
+from mpm.pictures.standard import Fields, draw_field, figures, plot_run
 
 SITE = "OAl(CH3)2"
 COVERAGE = f"theta_{SITE}"

@@ -3,7 +3,7 @@
 import pytest
 
 from mpm import Reactor, load_case
-from mpm.quantities import QUANTITIES, RATIO, flatten, known, quantity
+from mpm.report.quantities import QUANTITIES, RATIO, flatten, known, quantity
 from tests.cases import COARSE
 
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mpm.transport
-from mpm.case import Case
+import mpm.transport.species
+from mpm.case.case import Case
 from mpm.errors import ConvergenceError
-from mpm.reactor import Reactor
-from mpm.transport import Transport
+from mpm.reactor.reactor import Reactor
+from mpm.transport.species import Transport
 
 from .cases import MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, physical_numbers, run, zone
 
@@ -319,7 +319,7 @@ def test_newton_failure_keeps_the_last_good_state(monkeypatch: pytest.MonkeyPatc
 
     def spoil(r: Reactor) -> None:
         if r.time > 0.55:
-            monkeypatch.setattr(mpm.transport, "NEWTON_LIMIT", 1)
+            monkeypatch.setattr(mpm.transport.species, "NEWTON_LIMIT", 1)
 
     with pytest.raises(ConvergenceError, match=r"step 4\d.*t = 0\.\d+ s.*TMA.*Newton.*residual"):
         reactor.run(output=tmp_path / "failed", callback=spoil)

@@ -74,7 +74,7 @@ def test_dose_rows(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*arguments: Any) -> None:
         raise AssertionError("a stored run was made again")
 
-    monkeypatch.setattr("mpm.reactor.Reactor.__init__", fail)
+    monkeypatch.setattr("mpm.reactor.reactor.Reactor.__init__", fail)
     assert measure(lab, "R10").verdict == HOLDS
 
 

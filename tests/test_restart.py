@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpm import checkpoint
-from mpm.case import Case
+from mpm.case.case import Case
 from mpm.errors import InputError, Interrupted
-from mpm.output import RunDirectory
+from mpm.output.directory import RunDirectory
+from mpm.output.results import load_run
 from mpm.parallel import on_root, total
-from mpm.reactor import Reactor, Result
-from mpm.replay import Replay
-from mpm.results import load_run
+from mpm.reactor import checkpoint
+from mpm.reactor.reactor import Reactor, Result
+from mpm.reactor.sequence import Replay
 
 from .cases import MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, run, zone
 
@@ -357,7 +357,7 @@ def test_numerical_failure_ends_with_status_3(tmp_path: Path) -> None:
     state (here: Newton's limit is spoilt after 20 steps of the first attempt)."""
     case = zone({**SHORT, "time.end": "0.6 s"}, TINY)
     spoil = (
-        "import mpm.transport as t; advance = t.Transport.advance\n"
+        "import mpm.transport.species as t; advance = t.Transport.advance\n"
         "def spoilt(self, number, t0, t1, halvings=0):\n"
         "    t.NEWTON_LIMIT = 1 if t0 > 0.3 else 30\n"
         "    return advance(self, number, t0, t1, halvings)\n"

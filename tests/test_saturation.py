@@ -2,10 +2,10 @@
 
 import pytest
 
-from mpm.case import Case
-from mpm.checks import check_case
-from mpm.chemistry import Mechanism, Species, SurfaceReaction
-from mpm.saturation import coverage_met, molecules_per_site, saturate, slowest_turnover, uptake
+from mpm.advice.checks import check_case
+from mpm.case.case import Case
+from mpm.physics.mechanism import Mechanism, Species, SurfaceReaction
+from mpm.physics.saturation import coverage_met, molecules_per_site, saturate, slowest_turnover, uptake
 
 from .cases import COARSE, run, zone
 

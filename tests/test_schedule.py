@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from mpm.schedule import RESTING, Schedule, aligned_step
+from mpm.motion.schedule import RESTING, Schedule, aligned_step
 
 from .cases import SHORT, TINY, strip_case, zone
 

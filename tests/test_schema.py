@@ -8,11 +8,11 @@ from typing import Any
 import jsonschema
 import pytest
 
-from mpm.case import case_schema
+from mpm.case.case import case_schema
+from mpm.case.chemistry import mechanism_schema
 from mpm.cli import main
 from mpm.dem.case import DemCase, powder_schema
 from mpm.dem.powder import POWDERS
-from mpm.mechanism import mechanism_schema
 from mpm.sweep.cluster import SLURM_OWN
 from mpm.sweep.schema import sweep_schema
 from mpm.sweep.sweepfile import AXIS_KEYS, RANGE_KEYS, SWEEP_KEYS

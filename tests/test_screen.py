@@ -15,19 +15,19 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from mpm.case import load_case
-from mpm.checks import check_case
-from mpm.checkscreen import print_report
+from mpm.advice.checks import check_case
+from mpm.advice.screen import print_report
+from mpm.case.case import load_case
 from mpm.cli import main
+from mpm.cli.nextsteps import how_to_go_on
 from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
-from mpm.nextsteps import how_to_go_on
-from mpm.progress import Progress, duration
+from mpm.reactor.progress import Progress, duration
+from mpm.report.tables import print_mesh, print_summary
 from mpm.screen import Listing, screen
-from mpm.tables import print_mesh, print_summary
 
 from .cases import SHORT, TINY
 
-from mpi4py import MPI  # isort: skip  (after mpm.fem)
+from mpi4py import MPI  # isort: skip  (after mpm.numerics.fem)
 
 EXAMPLE = (Path(__file__).parent / "example_case.toml").read_text(encoding="utf-8")
 

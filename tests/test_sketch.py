@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mpm.case import Case, load_case
-from mpm.sketch import ASCII, BOXES, pen_for, sketch
+from mpm.advice.sketch import ASCII, BOXES, pen_for, sketch
+from mpm.case.case import Case, load_case
 
 FOUR = Path(__file__).parents[1] / "meshes" / "four_cycles.toml"
 WIDTHS = [40, 60, 80, 140]

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mpm.coarsening
-import mpm.steady
-from mpm.case import Case, load_case
+import mpm.reactor.coarsening
+import mpm.reactor.steady
+from mpm.case.case import Case, load_case
 from mpm.cli import main
 from mpm.errors import ConvergenceError
-from mpm.kinetics import phi1, phi2
-from mpm.reactor import Reactor
-from mpm.replay import Replay
-from mpm.results import load_run
+from mpm.output.results import load_run
+from mpm.physics.kinetics import phi1, phi2
+from mpm.reactor.reactor import Reactor
+from mpm.reactor.sequence import Replay
 
 from .cases import (
     CASES,
@@ -196,7 +196,7 @@ def test_periodic_solids_between_two_precursors(
     """
     case = grid_case("cycle", dose, speed, COARSE).with_({"geometry.bed_inflow": "periodic"})
     _, straight = run(case)
-    monkeypatch.setattr(mpm.steady, "TRIES", 3)
+    monkeypatch.setattr(mpm.reactor.steady, "TRIES", 3)
     reactor, result = run(case)
     np.testing.assert_allclose(result.coverage("bed", "OH"), straight.coverage("bed", "OH"), atol=1e-6)
     events = reactor.totals().surface.sum(axis=(1, 2))
@@ -221,7 +221,7 @@ def test_a_coarser_mesh_first_changes_nothing(kind: str, monkeypatch: pytest.Mon
     """Fails when the steady state depends on whether it was reached from that of a coarser mesh, or when that saves no Newton step."""
     case = grid_case(kind, 2e-4, 1.3, COARSE)
     cold, alone = run(case, MPI.COMM_WORLD)
-    monkeypatch.setattr(mpm.coarsening, "FEWEST", 200)
+    monkeypatch.setattr(mpm.reactor.coarsening, "FEWEST", 200)
     warm, after = run(case, MPI.COMM_WORLD)
     assert warm.steps < cold.steps
     assert_same_numbers({**alone.summary, "steps": warm.steps}, after.summary, 1e-8)
@@ -246,10 +246,10 @@ def test_failure_leaves_the_last_iterate(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Fails when a solve that stops ends otherwise than with exit 3, one line that says where and what to try, and the last iterate."""
-    monkeypatch.setattr(mpm.steady, "TRIES", 2)
-    monkeypatch.setattr(mpm.steady, "STEP_TRIES", 1)
-    monkeypatch.setattr(mpm.steady, "SETTLED", 0.0)  # no step of pseudo-time ends well
-    monkeypatch.setattr(mpm.steady, "SHORTEST_STEP", 0.1)
+    monkeypatch.setattr(mpm.reactor.steady, "TRIES", 2)
+    monkeypatch.setattr(mpm.reactor.steady, "STEP_TRIES", 1)
+    monkeypatch.setattr(mpm.reactor.steady, "SETTLED", 0.0)  # no step of pseudo-time ends well
+    monkeypatch.setattr(mpm.reactor.steady, "SHORTEST_STEP", 0.1)
     settings = [f"{key}={json.dumps(value)}" for key, value in {**TINY, **STEADY}.items()]
     arguments = [part for setting in settings for part in ("--set", setting)]
     status = main(["run", str(CASES / "single_zone.toml"), "-o", str(tmp_path / "run"), "-q", *arguments])
@@ -267,14 +267,14 @@ def test_failure_leaves_the_last_iterate(
 
 def test_no_number_is_written_that_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Fails when a linear system without a solution ends otherwise than with ConvergenceError, or leaves NaN in a field or number."""
-    solve = mpm.steady.DirectSolver.solve
+    solve = mpm.reactor.steady.DirectSolver.solve
 
     def spoilt(self: Any, rhs: Any, solution: Any) -> None:
         solve(self, rhs, solution)
         if self.name == "steady state":
             solution.array[0] = np.nan
 
-    monkeypatch.setattr(mpm.steady.DirectSolver, "solve", spoilt)
+    monkeypatch.setattr(mpm.reactor.steady.DirectSolver, "solve", spoilt)
     case = zone({**STEADY, "geometry.bed_inflow": "periodic"}, TINY)
     with pytest.raises(ConvergenceError, match="steady state: Newton stopped"):
         Reactor(case, MPI.COMM_SELF).run(tmp_path / "run")

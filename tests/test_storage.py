@@ -15,10 +15,10 @@ from mpm.dem.case import load_case as load_powder
 from mpm.dem.run import prepare
 from mpm.errors import InputError, StorageError, storage_error
 from mpm.files import lock, replacing, write_atomically, write_in_place
-from mpm.mesh import write_msh
-from mpm.output import RunDirectory
-from mpm.progress import log_file
-from mpm.reactor import Reactor
+from mpm.mesh.msh import write_msh
+from mpm.output.directory import RunDirectory
+from mpm.reactor.progress import log_file
+from mpm.reactor.reactor import Reactor
 
 from .cases import MPI, SHORT, TINY, run, zone
 
@@ -142,7 +142,7 @@ def test_one_powder_run_at_a_time(tmp_path: Path) -> None:
 
 LIMITED = """
 import resource, sys
-import mpm.fem
+import mpm.numerics.fem
 from mpi4py import MPI  # which needs files of its own, in memory
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
 from mpm.cli import main
@@ -175,7 +175,7 @@ def test_a_mesh_is_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.Monkey
     path = tmp_path / "m.msh"
     write_msh(CASE, path)
     whole = path.read_bytes()
-    monkeypatch.setattr("mpm.mesh.END", b"$EndOfSomethingElse\n")
+    monkeypatch.setattr("mpm.mesh.msh.END", b"$EndOfSomethingElse\n")
     with pytest.raises(OSError, match="No space left"):
         write_msh(CASE.with_({"geometry.cell_width": "4 mm"}), path)
     assert path.read_bytes() == whole and list(tmp_path.iterdir()) == [path]
@@ -242,11 +242,11 @@ def test_places_that_may_not_be_written(tmp_path: Path) -> None:
 COMPILE = """
 import sys
 from pathlib import Path
-import mpm.fem, ufl
+import mpm.numerics.fem, ufl
 from mpi4py import MPI
-from mpm.fem import dolfinx
-mpm.fem.cache_directory = lambda: Path(sys.argv[1])
-mpm.fem.check_cache()
+from mpm.numerics.fem import dolfinx
+mpm.numerics.fem.cache_directory = lambda: Path(sys.argv[1])
+mpm.numerics.fem.check_cache()
 mesh = dolfinx.mesh.create_unit_square(MPI.COMM_WORLD, 2, 2)
 one = dolfinx.fem.form(dolfinx.fem.Constant(mesh, 1.0) * ufl.dx)
 print(dolfinx.fem.assemble_scalar(one))
@@ -279,7 +279,7 @@ def test_equations_that_cannot_be_compiled_are_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Fails when an absent compiler ends in a traceback of cffi."""
-    monkeypatch.setattr("mpm.fem.cache_directory", lambda: tmp_path / "cache")
+    monkeypatch.setattr("mpm.numerics.fem.cache_directory", lambda: tmp_path / "cache")
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     with pytest.raises(InputError, match=r"the equations cannot be compiled .* a C compiler and room"):
@@ -288,8 +288,8 @@ def test_equations_that_cannot_be_compiled_are_said_in_one_line(
 
 def test_a_compiler_that_does_not_end_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails when a run that has waited in vain for another that compiles ends in a traceback."""
-    monkeypatch.setattr("mpm.fem.cache_directory", lambda: tmp_path)
-    monkeypatch.setattr("mpm.fem.COMPILING", 0.1)
+    monkeypatch.setattr("mpm.numerics.fem.cache_directory", lambda: tmp_path)
+    monkeypatch.setattr("mpm.numerics.fem.COMPILING", 0.1)
     with (
         lock(tmp_path / "lock"),
         pytest.raises(InputError, match=r"another process has been compiling for 0\.1 s"),

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpm.case import load_case
-from mpm.geometry import Grid
-from mpm.streamlines import stream_function, stream_levels
+from mpm.case.case import load_case
+from mpm.mesh.grid import Grid
+from mpm.pictures.streamlines import stream_function, stream_levels
 
 
 def grid(**changes: object) -> Grid:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mpm.bed import Bed
-from mpm.flow import FaceFlow
-from mpm.reactor import Reactor
-from mpm.strip import Strip
-from mpm.transport import Transport
+from mpm.flow.problem import FaceFlow
+from mpm.mesh.strip import Strip
+from mpm.reactor.reactor import Reactor
+from mpm.transport.coverage import Bed
+from mpm.transport.species import Transport
 
 from .cases import MPI, TINY, assert_laws, column_case, norm, rate, run, strip_case, zone
 

@@ -9,15 +9,14 @@ from typing import Any
 
 import pytest
 
-from mpm import watch
-from mpm.cli import main
+from mpm.cli import main, watch
 from mpm.errors import ConvergenceError
 from mpm.files import locked
-from mpm.following import look
-from mpm.output import RunDirectory
-from mpm.reactor import Reactor
+from mpm.output.directory import RunDirectory
+from mpm.output.following import look
+from mpm.reactor.reactor import Reactor
 
-from mpi4py import MPI  # isort: skip  (after mpm.reactor, which loads the finite-element stack)
+from mpi4py import MPI  # isort: skip  (after mpm.reactor.reactor, which loads the finite-element stack)
 
 from .cases import SHORT, TINY, zone
 
@@ -121,7 +120,7 @@ def test_what_is_no_run_is_not_watched(tmp_path: Path, capsys: pytest.CaptureFix
     assert "nothing to watch" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("module", ["watch", "compare", "kinds", "rundirs"])
+@pytest.mark.parametrize("module", ["cli.watch", "output.compare", "case.kinds", "output.rundirs"])
 def test_what_only_rank_0_loads_starts_no_mpi(module: str) -> None:
     """Fails when a verb that one rank alone carries out would wait in MPI's start for the others, for ever."""
     code = f"import sys, mpm.{module}; sys.exit('mpi4py.MPI' in sys.modules)"

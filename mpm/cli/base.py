@@ -56,8 +56,8 @@ def _options(
     ] = False,
 ) -> None:
     if version:
+        from mpm.numerics.versions import versions
         from mpm.revision import revision
-        from mpm.versions import versions
 
         found = {
             "revision": revision()

@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
+from mpm.case.settings import parse_settings
 from mpm.cli.base import CaseArgument, SetOption, app
 from mpm.launcher import rank
 from mpm.screen import screen
-from mpm.settings import parse_settings
 
 
 @app.command()
@@ -27,14 +27,14 @@ def mesh(
     mpm mesh single_zone                           writes single_zone.msh
     mpm mesh wide.toml -o fine.msh --set geometry.cell_width='1 mm'
     """
-    from mpm.case import load_case
-    from mpm.names import case_or_geometry
+    from mpm.case.case import load_case
+    from mpm.case.names import case_or_geometry
 
     loaded = load_case(case_or_geometry(case), parse_settings(settings))
     if rank() != 0:
         return
-    from mpm.mesh import write_msh
-    from mpm.tables import print_mesh
+    from mpm.mesh.msh import write_msh
+    from mpm.report.tables import print_mesh
 
     path = output or Path(f"{Path(case).stem}.msh")
     write_msh(loaded, path)
@@ -61,8 +61,8 @@ def check(
     mpm check wide.toml --full                     every key with its unit and where its value comes from
     mpm check wide.toml --json                     for a program
     """
-    from mpm.case import load_case
-    from mpm.checks import check_case
+    from mpm.advice.checks import check_case
+    from mpm.case.case import load_case
 
     loaded = load_case(case, parse_settings(settings))
     report = check_case(loaded)
@@ -73,9 +73,9 @@ def check(
 
         print(json.dumps({**report, "case": loaded.to_dict()}, indent=2, allow_nan=False))
         return
-    from mpm.checkscreen import print_report
-    from mpm.marks import print_full
-    from mpm.nextsteps import print_steps
+    from mpm.advice.screen import print_report
+    from mpm.case.marks import print_full
+    from mpm.cli.nextsteps import print_steps
 
     if full:
         print_full(loaded, screen())
@@ -106,7 +106,7 @@ def schema(
 
 def _schema(kind: str) -> dict[str, Any]:
     if kind == "case":
-        from mpm import case
+        from mpm.case import case
 
         return case.case_schema()
     if kind == "sweep":
@@ -118,7 +118,7 @@ def _schema(kind: str) -> dict[str, Any]:
 
         return powder_schema()
     if kind == "mechanism":
-        from mpm.mechanism import mechanism_schema
+        from mpm.case.chemistry import mechanism_schema
 
         return mechanism_schema()
     from mpm.errors import InputError

@@ -11,7 +11,7 @@ from mpm.errors import MpmError
 
 def complete_case(incomplete: str) -> list[str]:
     """Names of built-in cases, and what lies here; nothing, so that the shell takes over, where only directories fit."""
-    from mpm.caseio import built_in_files
+    from mpm.case.sources import built_in_files
 
     if "/" in incomplete:
         return []
@@ -30,8 +30,8 @@ def complete_run(incomplete: str) -> list[str]:
 
 def complete_setting(context: typer.Context, incomplete: str) -> list[str]:
     """Keys of the case that stands before --set on the line; of no other, since only it knows its ports and layers."""
-    from mpm.case import load_case
-    from mpm.keys import values
+    from mpm.case.case import load_case
+    from mpm.case.keys import values
 
     for case in filter(
         None, (context.params.get("case"), *context.args)
@@ -45,6 +45,6 @@ def complete_setting(context: typer.Context, incomplete: str) -> list[str]:
 
 def complete_key(incomplete: str) -> list[str]:
     """Every key that a case file may have."""
-    from mpm.keys import all_keys
+    from mpm.case.keys import all_keys
 
     return [key.name for key in all_keys() if key.name.startswith(incomplete)]

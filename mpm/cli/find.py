@@ -28,7 +28,7 @@ def list_(
     mpm list                 everything
     mpm list materials       one kind
     """
-    from mpm.catalogue import sections
+    from mpm.guide.catalogue import sections
 
     found = sections(kind)
     if rank() != 0:
@@ -66,8 +66,8 @@ def explain(
     mpm explain titration.tma.exit_mean            a number of summary.json
     mpm explain x_TMA                              a field of fields.pvd
     """
-    from mpm.explain import explain as explained
-    from mpm.explain import overview
+    from mpm.guide.explain import explain as explained
+    from mpm.guide.explain import overview
 
     lines = overview() if key is None else explained(key)
     if rank() == 0:
@@ -98,8 +98,8 @@ def new(
     """
     if rank() != 0:
         return
-    from mpm.newcase import write_new_case
-    from mpm.nextsteps import print_steps
+    from mpm.cli.nextsteps import print_steps
+    from mpm.guide.newcase import write_new_case
 
     path, schema = write_new_case(file, start)
     console = screen()

@@ -123,8 +123,8 @@ def compare(
     """
     if rank() != 0:
         return
-    from mpm.compare import print_comparison
-    from mpm.results import load_run
+    from mpm.output.compare import print_comparison
+    from mpm.output.results import load_run
 
     print_comparison(load_run(first), load_run(second), everything, screen())
 
@@ -148,7 +148,7 @@ def paraview(
     """
     if rank() != 0:
         return
-    from mpm.paraview import open_script, write_scripts
+    from mpm.pictures.paraview import open_script, write_scripts
 
     scripts = write_scripts(directory, lambda line: print(line, file=sys.stderr))
     if start:

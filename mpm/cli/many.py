@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
+from mpm.case.settings import parse_settings
 from mpm.cli.base import CaseArgument, SetOption, app
 from mpm.launcher import rank
 from mpm.screen import screen
-from mpm.settings import parse_settings
 
 
 @app.command()
@@ -67,7 +67,7 @@ def optimise(
     The start are the mass fractions that would be just enough if nothing were lost; every further step is a steady state. DIR gets the
     case with the best doses (case.toml), all steady states (points.csv) and a picture of the search (plots/search.png).
     """
-    from mpm.case import load_case
+    from mpm.case.case import load_case
 
     loaded = load_case(case, parse_settings(settings))
     directory = output or Path("results") / "optimise" / Path(case).stem
@@ -84,7 +84,7 @@ def optimise(
         search.run(limit)
         search.found()
         return
-    from mpm.searchscreen import draw_search, print_found, print_point, print_task
+    from mpm.cli.searchscreen import draw_search, print_found, print_point, print_task
 
     print_task(search, limit, console)
     try:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mpm.case.settings import parse_settings
 from mpm.cli.base import CaseArgument, RunArgument, SetOption, app
 from mpm.errors import InputError, MpmError
 from mpm.launcher import rank
 from mpm.screen import screen
-from mpm.settings import parse_settings
 
 if TYPE_CHECKING:
-    from mpm.case import Case
+    from mpm.case.case import Case
 
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="no progress line and no summary")]
 ReportOption = Annotated[bool, typer.Option("--no-report", help="do not write DIR/report.html at the end")]
@@ -50,8 +50,8 @@ def run(
 
     Ctrl-C stops cleanly; mpm resume DIR goes on.
     """
-    from mpm.case import load_case
-    from mpm.rundirs import AUTO, directory_named, make_numbered
+    from mpm.case.case import load_case
+    from mpm.output.rundirs import AUTO, directory_named, make_numbered
 
     if resume and (overwrite or name == AUTO):
         other = "--overwrite" if overwrite else f"--name {AUTO}"
@@ -61,7 +61,7 @@ def run(
     loaded = load_case(case, parse_settings(settings))
     directory = output or directory_named(Path(case).stem if name is None else name)
     if name == AUTO:
-        import mpm.fem  # noqa: F401
+        import mpm.numerics.fem  # noqa: F401
         from mpm.parallel import on_root
 
         from mpi4py import MPI  # isort: skip  (after fem)
@@ -87,8 +87,8 @@ def resume(
 
     The case is the one in DIR/case.toml; nothing else is needed.
     """
-    from mpm.case import load_case
-    from mpm.rundirs import require_run
+    from mpm.case.case import load_case
+    from mpm.output.rundirs import require_run
 
     require_run(directory)
     case = load_case(directory / "case.toml", {} if end is None else {"time.end": end})
@@ -110,20 +110,20 @@ def watch(
 
     Ctrl-C ends the watching, not the run. Exit status: that of the run (0 done, 3 failed, 130 stopped), 0 while it goes on.
     """
-    from mpm.rundirs import require_run
+    from mpm.output.rundirs import require_run
 
     require_run(directory, "nothing to watch")
     if rank() == 0:
-        from mpm.watch import watch_run
+        from mpm.cli.watch import watch_run
 
         watch_run(directory, once, screen())
 
 
 def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: bool) -> dict[str, Any]:
     """Run `case` in `directory`, or go on there; returns the summary."""
-    from mpm.nextsteps import how_to_go_on
-    from mpm.reactor import Reactor
-    from mpm.rundirs import can_resume
+    from mpm.cli.nextsteps import how_to_go_on
+    from mpm.output.rundirs import can_resume
+    from mpm.reactor.reactor import Reactor
 
     if resume and not can_resume(directory, case) and rank() == 0:
         print(f"{directory}: no restart state yet, so the run begins anew", file=sys.stderr)
@@ -139,7 +139,7 @@ def _show(case: Case, summary: dict[str, Any], directory: Path, report: bool, qu
     """Print what has come out, and write the page; a page that cannot be written is no failure of the run."""
     if rank() != 0:
         return
-    from mpm.nextsteps import print_end
+    from mpm.cli.nextsteps import print_end
 
     if not quiet:
         print_end(case, summary, directory, screen(), report)

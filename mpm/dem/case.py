@@ -15,12 +15,12 @@ import numpy as np
 import tomli_w
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from mpm.case.kinds import POWDER, read_input
+from mpm.case.names import powder_file
+from mpm.case.schema import DRAFT, finished
 from mpm.errors import InputError
-from mpm.gases import ideal_gas_density
-from mpm.kinds import POWDER, read_input
-from mpm.names import powder_file
 from mpm.physics.fluidisation import mean_free_path
-from mpm.schema import DRAFT, finished
+from mpm.physics.gases import ideal_gas_density
 from mpm.units import (
     Density,
     Diameter,

@@ -9,12 +9,12 @@ from typing import Annotated, Any, ClassVar
 
 import typer
 
+from mpm.case.kinds import DEM_RUN, kind_of_directory, what_it_is
+from mpm.case.settings import parse_settings
 from mpm.errors import InputError
 from mpm.help import HELP_NAMES, App, Verbs
-from mpm.kinds import DEM_RUN, kind_of_directory, what_it_is
 from mpm.launcher import rank
 from mpm.screen import screen
-from mpm.settings import parse_settings
 
 from .accelerometer import fit_record, read_record, resample, spectrum
 from .case import load_case

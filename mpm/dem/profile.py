@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mpm.case.profile import COLUMNS, Conditions
 from mpm.files import write_atomically
-from mpm.profile import COLUMNS, Conditions
 
 from ..constants import GRAVITY
 from .waveform import Waveform, peak_displacement

@@ -8,18 +8,18 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from mpm.compare import changed_keys, changed_numbers
+from mpm.case.keys import values
 from mpm.errors import InputError
-from mpm.fieldnames import superscript
-from mpm.keys import values
+from mpm.output.compare import changed_keys, changed_numbers
+from mpm.output.results import Run
 from mpm.page.fields import Look, extent, read_film, value_range
 from mpm.page.numbers import rounded
 from mpm.page.run_page import RunPage, run_page
 from mpm.page.viewer import BUDGET, VALUES, looks, viewer
 from mpm.page.write import render
-from mpm.quantities import Quantity, flatten
-from mpm.results import Run
-from mpm.tables import natural_scale
+from mpm.report.fieldnames import superscript
+from mpm.report.quantities import Quantity, flatten
+from mpm.report.tables import natural_scale
 
 MOST_RUNS = 6
 """Beyond that a sweep says more than runs side by side."""

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.case import Case
+from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.files import read_text
-from mpm.outline import OKABE_ITO
-from mpm.quantities import quantity
-from mpm.results import Run
+from mpm.output.results import Run
+from mpm.pictures.outline import OKABE_ITO
+from mpm.report.quantities import quantity
 
 MM = 1e3
 DECADES = 6.0
@@ -168,7 +168,7 @@ def exit_profiles(run: Run) -> Chart | None:
 
 
 def _conveyed_rows(case: Case, run: Run) -> slice | None:
-    from mpm.diagnostics import conveyed_layer
+    from mpm.report.coating import conveyed_layer
 
     name = conveyed_layer(case)
     return None if name is None else run.grid.layer_rows(name)

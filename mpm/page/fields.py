@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.errors import InputError
-from mpm.results import Run
-from mpm.vtu import Snapshot
+from mpm.output.results import Run
+from mpm.output.vtu import Snapshot
 
 Floats = NDArray[np.float64]
 Maker = Callable[[Run, Snapshot], Floats]

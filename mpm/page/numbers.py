@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mpm.fieldnames import superscript
-from mpm.quantities import Quantity, flatten, quantity
-from mpm.tables import ROUNDING, natural_scale
+from mpm.report.fieldnames import superscript
+from mpm.report.quantities import Quantity, flatten, quantity
+from mpm.report.tables import ROUNDING, natural_scale
 
 GROUPS = (
     ("What leaves coated", ("titration.",)),

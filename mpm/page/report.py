@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from mpm.case.kinds import SWEEP_RUN, kind_of_directory
 from mpm.files import file_name
-from mpm.kinds import SWEEP_RUN, kind_of_directory
 from mpm.page.compare_page import compare_html, compare_page
 from mpm.page.run_page import run_html, run_page
 from mpm.page.sweep_page import sweep_html, sweep_page

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpm.checks import check_case
-from mpm.checkscreen import case_sheet
-from mpm.following import look
-from mpm.keys import values
-from mpm.marks import MARKS, Marked
+from mpm.advice.checks import check_case
+from mpm.advice.screen import case_sheet
+from mpm.case.keys import values
+from mpm.case.marks import MARKS, Marked
+from mpm.output.following import look
+from mpm.output.results import Run, load_run
 from mpm.page.curves import Chart, curves
 from mpm.page.numbers import Account, Row, accounts, errors, groups
 from mpm.page.strip import Drawing, drawing
 from mpm.page.viewer import BUDGET, viewer
 from mpm.page.write import render
-from mpm.results import Run, load_run
+from mpm.report.verdict import verdict
 from mpm.screen import HARD_SPACE, Listing, entry
-from mpm.verdict import verdict
 
 
 @dataclass(frozen=True)

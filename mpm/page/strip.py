@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from mpm.case import Case, Inlet, Outlet
-from mpm.outline import OKABE_ITO
-from mpm.results import fed_by
+from mpm.case.case import Case, Inlet, Outlet
+from mpm.output.results import fed_by
+from mpm.pictures.outline import OKABE_ITO
 
 WIDTH = 860.0
 """Length of the strip."""

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mpm.case.keys import find_key
+from mpm.case.schema import number_text
 from mpm.errors import InputError, MpmError
-from mpm.fieldnames import superscript
-from mpm.keys import find_key
 from mpm.page.numbers import shown
 from mpm.page.run_page import run_html, run_page
 from mpm.page.write import render, write_page
-from mpm.quantities import RATIO, Quantity, quantity
-from mpm.schema import number_text
+from mpm.report.fieldnames import superscript
+from mpm.report.quantities import RATIO, Quantity, quantity
+from mpm.report.tables import ROUNDING
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
-from mpm.tables import ROUNDING
 
 NAME = "report.html"
 MOST_PAGES = 200

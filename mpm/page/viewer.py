@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mpm.fieldnames import field_name
+from mpm.output.results import Run, made_sites
+from mpm.output.vtu import Snapshot
 from mpm.page.fields import (
     FEWEST_TIMES,
     MOST_JOINED,
@@ -21,8 +22,7 @@ from mpm.page.fields import (
     fewer_times,
     read_film,
 )
-from mpm.results import Run, made_sites
-from mpm.vtu import Snapshot
+from mpm.report.fieldnames import field_name
 
 BUDGET = 5_000_000
 """Bytes of fields that a page carries at most, beside 2 MB of plotly."""
@@ -65,7 +65,7 @@ def _speed(run: Run, snapshot: Snapshot) -> Floats:
 
 def stream_maker() -> Maker:
     """The stream function at the corners of the cells; found again only where the flow has changed since the snapshot before."""
-    from mpm.streamlines import stream_function
+    from mpm.pictures.streamlines import stream_function
 
     before: list[Floats] = []
 
@@ -117,7 +117,7 @@ def encoded(
 
 def table(run: Run, shown: Film, found: list[Encoded]) -> dict[str, Any]:
     """As the page's script reads it; lengths in mm."""
-    from mpm.streamlines import stream_levels
+    from mpm.pictures.streamlines import stream_levels
 
     last = shown.series["streams"][-1].astype(float)
     geometry = run.case.geometry

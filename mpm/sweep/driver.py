@@ -18,10 +18,10 @@ from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any
 
-from mpm.checks import check_case
+from mpm.advice.checks import check_case
+from mpm.cli.nextsteps import print_steps
 from mpm.errors import InputError
 from mpm.files import lock, write_atomically
-from mpm.nextsteps import print_steps
 from mpm.screen import screen
 from mpm.sweep.board import Board, now, say
 from mpm.sweep.cluster import Pool, PoolLost, open_pool

@@ -1,7 +1,7 @@
 """Pictures of a sweep, drawn from its results.csv and sweep.json alone.
 
 Lines over one axis, a map of coloured cells over two, parallel coordinates beyond: one PNG per chosen number in plots/. Axes carry the
-unit that the sweep file writes, numbers their words and unit of `mpm.quantities`. Points without a result leave a gap that a legend
+unit that the sweep file writes, numbers their words and unit of `mpm.report.quantities`. Points without a result leave a gap that a legend
 explains: a cross at the foot of a line, a hatched cell of a map; they are counted below parallel coordinates.
 """
 
@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mpm.errors import InputError
-from mpm.fieldnames import superscript
 from mpm.files import file_name, write_picture
 from mpm.labels import literal
-from mpm.quantities import Quantity, quantity
+from mpm.report.fieldnames import superscript
+from mpm.report.quantities import Quantity, quantity
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
 from mpm.sweep.sweepfile import DEFAULT_PICTURES
@@ -125,7 +125,7 @@ def heat_map(figure: "Figure", x: Scale, y: Scale, values: np.ndarray, label: st
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    from mpm.maps import PLAIN
+    from mpm.pictures.maps import PLAIN
 
     columns, rows = np.unique(x.positions), np.unique(y.positions)
     field = np.full((len(rows), len(columns)), np.nan)

@@ -7,9 +7,9 @@ import warnings
 from dataclasses import dataclass
 from typing import Any
 
-from mpm.case import Case
+from mpm.case.case import Case
+from mpm.case.settings import file_in
 from mpm.errors import InputError
-from mpm.settings import file_in
 from mpm.sweep.quantities import to_number
 from mpm.sweep.sweepfile import MOST_POINTS, Axis, Sweep
 

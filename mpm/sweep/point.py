@@ -19,7 +19,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from mpm.case import load_case
+from mpm.case.case import load_case
 from mpm.errors import FULL, InputError, StorageError
 from mpm.files import write_atomically
 from mpm.revision import digest

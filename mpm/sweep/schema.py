@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mpm.schema import DRAFT
+from mpm.case.schema import DRAFT
 from mpm.sweep.sweepfile import DEFAULT_COLUMNS, DEFAULT_PICTURES, METHODS, MODES, MOST_POINTS
 
 _LEVEL = {"type": ["string", "number", "boolean", "array"]}

@@ -24,12 +24,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpm.case import Case, load_case
+from mpm.case.case import Case, load_case
+from mpm.case.kinds import SWEEP, parse_input, read_input_text
+from mpm.case.names import sweep_file
+from mpm.case.settings import file_in
 from mpm.errors import InputError
 from mpm.files import is_file
-from mpm.kinds import SWEEP, parse_input, read_input_text
-from mpm.names import sweep_file
-from mpm.settings import file_in
 from mpm.sweep.conditions import Condition
 from mpm.sweep.quantities import Range, to_number, unit_as_written
 from mpm.units import LARGEST, describe

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.case import Case
-from mpm.engineering import inlet_excess
-from mpm.results import Run
+from mpm.advice.engineering import inlet_excess
+from mpm.case.case import Case
+from mpm.output.results import Run
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab
 from reproduction.zone_rows import bed_front

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.case import Case
-from mpm.geometry import Grid
-from mpm.motion import Vibration
+from mpm.case.case import Case
+from mpm.mesh.grid import Grid
+from mpm.motion.kinematics import Vibration
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Arrays, Lab
 

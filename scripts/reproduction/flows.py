@@ -9,16 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm import fem  # noqa: F401  (fem first: it loads the finite-element stack)
-from mpm.case import Case
-from mpm.cycle import cycle_motions, periodic_flow
-from mpm.flow import FaceFlow, FlowProblem
-from mpm.geometry import Grid
-from mpm.motion import BedMotion, StepMotion, step_motion
-from mpm.replay import March
-from mpm.schedule import Schedule
-from mpm.steadyflow import FlowField, steady_flow
-from mpm.strip import Strip
+from mpm.case.case import Case
+from mpm.flow.cycle import cycle_motions, periodic_flow
+from mpm.flow.problem import FaceFlow, FlowProblem
+from mpm.flow.steady import FlowField, steady_flow
+from mpm.mesh.grid import Grid
+from mpm.mesh.strip import Strip
+from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
+from mpm.motion.schedule import Schedule
+from mpm.reactor.sequence import March
 from reproduction.store import Arrays, Lab
 
 from mpi4py import MPI  # isort: skip  (after fem)

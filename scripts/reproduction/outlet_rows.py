@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.constants import GAS_CONSTANT
-from mpm.results import Run
+from mpm.output.results import Run
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab
 from reproduction.zone_rows import DOSE, DOSES, dose_case, excess, feed, increasing

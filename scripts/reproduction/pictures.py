@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from mpm.outline import OKABE_ITO, draw_ports, draw_zones, formula
-from mpm.pictures import STYLE
-from mpm.results import Run
+from mpm.output.results import Run
+from mpm.pictures.outline import OKABE_ITO, draw_ports, draw_zones, formula
+from mpm.pictures.standard import STYLE
 from reproduction import cycle_rows, outlet_rows, vibration_rows, zone_rows
 from reproduction.store import Lab
 

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.case import Case, load_case
+from mpm.case.case import Case, load_case
 from mpm.files import write_atomically
-from mpm.results import Run, load_run
+from mpm.output.results import Run, load_run
 from reproduction.meshes import MESHES
 
 ROOT = Path(__file__).parents[2]
@@ -73,7 +73,7 @@ class Lab:
         directory = self.folder / "runs" / case.content_hash()[:16]
         if not self._done(directory):
             self._may_run(case)
-            from mpm.reactor import Reactor
+            from mpm.reactor.reactor import Reactor
 
             started = time.monotonic()
             resume = (directory / "checkpoint.npz").exists()

@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
-from mpm.case import Case
-from mpm.geometry import Grid
-from mpm.motion import BedMotion
-from mpm.outline import draw_ports
-from mpm.pictures import STYLE
+from mpm.case.case import Case
+from mpm.mesh.grid import Grid
+from mpm.motion.kinematics import BedMotion
+from mpm.pictures.outline import draw_ports
+from mpm.pictures.standard import STYLE
 from reproduction.flow_rows import GAMMAS, resolved
 from reproduction.flows import BOTTOM, LEFT, RIGHT, TOP, at_rest, cycle, porosities
 from reproduction.pictures import save

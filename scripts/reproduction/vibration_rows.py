@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.case import Case
-from mpm.fronts import front, layer_mean
-from mpm.results import Run
+from mpm.case.case import Case
+from mpm.output.results import Run
+from mpm.report.fronts import front, layer_mean
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab
 from reproduction.zone_rows import feed, increasing

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.case import Case
-from mpm.engineering import inlet_excess
-from mpm.fronts import coverage_front, layer_mean
-from mpm.results import Run, sites_made_by
+from mpm.advice.engineering import inlet_excess
+from mpm.case.case import Case
+from mpm.output.results import Run, sites_made_by
+from mpm.report.fronts import coverage_front, layer_mean
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab
 
@@ -48,7 +48,7 @@ def increasing(values: list[float], margin: float = 0.0) -> bool:
 
 
 def bed_front(run: Run, inlet: str, index: int = -1) -> float | None:
-    """Where the coverage that an inlet makes passes 1/2 in the bed at a stored time (`mpm.fronts.coverage_front`)."""
+    """Where the coverage that an inlet makes passes 1/2 in the bed at a stored time (`mpm.report.fronts.coverage_front`)."""
     port = next(i for i in run.case.geometry.inlets if i.name == inlet)
     (site,) = sites_made_by(run.case, port)
     profile = layer_mean(run.grid, run.field(run.snapshot(index), f"theta_{site}"), "bed")

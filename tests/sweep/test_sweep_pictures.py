@@ -12,7 +12,7 @@ from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 
 from mpm.errors import InputError
-from mpm.maps import PLAIN
+from mpm.pictures.maps import PLAIN
 from mpm.sweep.pictures import Scale, draw, heat_map, line, parallel_coordinates, spaced
 
 DOSE = Scale("dose", np.repeat([1e-4, 2e-4, 4e-4], 2), (), True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mpm.case import load_case
+from mpm.case.case import load_case
 from mpm.errors import InputError
 from mpm.sweep.cluster import slurm_options
 from mpm.sweep.conditions import Condition

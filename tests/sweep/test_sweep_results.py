@@ -10,7 +10,7 @@ import pytest
 
 import mpm
 from mpm.errors import InputError
-from mpm.quantities import flatten, unit_of
+from mpm.report.quantities import flatten, unit_of
 from mpm.sweep import driver
 from mpm.sweep.cluster import Pool
 from mpm.sweep.layout import Layout

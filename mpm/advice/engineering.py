@@ -1,0 +1,217 @@
+"""What an engineer works out on paper before running a case: each number one short function with its source.
+
+SI units throughout; velocities of gas are superficial. Conveying limits and minimum fluidisation are those of
+`mpm.physics`, which the DEM substudy uses as well. `mpm check` prints these numbers for a case.
+"""
+
+from __future__ import annotations
+
+import math
+
+from mpm.case.case import Case
+from mpm.case.geometry import Inlet
+from mpm.case.materials import Material
+from mpm.mesh.grid import Grid
+from mpm.motion.kinematics import Vibration
+from mpm.motion.schedule import Schedule
+from mpm.physics.saturation import molecules_per_site
+
+MEMORY_OF_A_RANK = 0.11e9
+"""Interpreter, PETSc and MPI before there is a mesh [bytes]."""
+MEMORY_OF_A_CELL = 17.5e3
+"""Flow factors, operators and fields [bytes]; measured, as the next one, at 28,000 and 99,000 cells."""
+MEMORY_OF_A_CELL_AND_PHASE = 0.25e3
+"""Operators of one phase of the cycle in the resolved fidelity [bytes]."""
+
+
+def excess_number(
+    velocity: float,
+    width: float,
+    concentration: float,
+    bed_velocity: float,
+    bed_height: float,
+    surface_to_volume: float,
+    site_density: float,
+) -> float:
+    """Precursor molecules fed per surface site that passes, gamma = v w C / (|u_bed| h S n_s) (thesis, 5-20)."""
+    sites = abs(bed_velocity) * bed_height * surface_to_volume * site_density
+    return velocity * width * concentration / sites if sites > 0.0 else math.inf
+
+
+def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float | None] | None:
+    """Species, excess number and dose ratio of an inlet; None without a moving bed or a surface reaction.
+
+    The dose ratio is the excess number over what saturation needs (`mpm.physics.saturation`): 1 molecule per site for TMA, 1.5
+    for water. None where the precursor never saturates the surface.
+    """
+    bed, species = case.geometry.moving_layer, case.mechanism.precursor(inlet.mass_fractions)
+    if bed is None or bed.material is None or species is None or case.motion.mean_velocity == 0.0:
+        return None
+    concentration = case.feed_concentrations(inlet.mass_fractions)[species]
+    material = bed.material
+    if material.surface_to_volume == 0.0:
+        return None
+    excess = excess_number(
+        inlet.velocity,
+        inlet.width,
+        concentration,
+        case.motion.mean_velocity,
+        bed.height,
+        material.surface_to_volume,
+        material.site_density,
+    )
+    need = molecules_per_site(case.mechanism, species, material.initial_coverage, case.gas.temperature)
+    return species, excess, excess / need if need else None
+
+
+def reynolds(density: float, velocity: float, length: float, viscosity: float) -> float:
+    """Re = rho u l / mu."""
+    return density * velocity * length / viscosity
+
+
+def effective_diffusivity(material: Material, diffusivity: float, direction: int = 1) -> float:
+    """D_eff = porosity D / tau^2 [m2/s] along x (direction 0) or y (1); `diffusivity` in free gas."""
+    return material.porosity * diffusivity / material.tortuosity_factor[direction]
+
+
+def peclet(velocity: float, length: float, diffusivity: float) -> float:
+    """Pe = u l / D: convection over diffusion."""
+    return velocity * length / diffusivity
+
+
+def damkoehler_convection(
+    surface_to_volume: float, rate_constant: float, length: float, velocity: float
+) -> float:
+    """Da_I = S k l / u: reaction on fresh surface over convection along `length`."""
+    return surface_to_volume * rate_constant * length / velocity
+
+
+def damkoehler_diffusion(
+    surface_to_volume: float, rate_constant: float, length: float, diffusivity: float
+) -> float:
+    """Da_II = S k l^2 / D_eff: reaction on fresh surface over diffusion across `length`, the square of Thiele's modulus."""
+    return surface_to_volume * rate_constant * length**2 / diffusivity
+
+
+def front_thickness(surface_to_volume: float, rate_constant: float, diffusivity: float) -> float:
+    """sqrt(D_eff/(S k)) [m]: distance over which diffusing gas reacts away on fresh surface."""
+    return math.sqrt(diffusivity / (surface_to_volume * rate_constant))
+
+
+def pore_diameter(material: Material) -> float:
+    """Diameter [m] of the straight capillaries with the layer's permeability, d = sqrt(32 tau^2 K/eps), the narrower direction.
+
+    Hagen and Poiseuille: K = eps d^2/(32 tau^2), with tau^2 the tortuosity factor.
+    """
+    return min(
+        math.sqrt(32.0 * tortuosity * permeability / material.porosity)
+        for tortuosity, permeability in zip(material.tortuosity_factor, material.permeability, strict=True)
+    )
+
+
+def knudsen(free_path: float, diameter: float) -> float:
+    """Kn = l/d: mean free path over the diameter of a pore. Gas is a continuum below about 0.01."""
+    return free_path / diameter
+
+
+def flow_resistance(case: Case) -> float:
+    """Sum of h/k_y over the porous layers [1/m]: pressure drop over viscosity and superficial velocity (Darcy)."""
+    return sum(
+        layer.height / layer.material.permeability[1] for layer in case.geometry.layers if layer.material
+    )
+
+
+def spreading_length(case: Case) -> float:
+    """Distance lambda = sqrt(H^3 R / 12) [m] over which gas spreads in the plenum before it enters the porous layers.
+
+    Slot flow under a resistance: q = -(H^3/12 mu) dp/dx in the gas layers below (height H together) and
+    u = p/(mu R) through the porous ones give lambda^2 u'' = u - source. Far above the zone length, as in the
+    thesis' reactor (3.7 m), the gas rises evenly along the strip whatever the place of the ports.
+    """
+    height = 0.0
+    for layer in case.geometry.layers:
+        if layer.material is not None:
+            return math.sqrt(height**3 * flow_resistance(case) / 12.0)
+        height += layer.height
+    return math.inf
+
+
+def rising_velocity(case: Case, x: float) -> float:
+    """Estimated superficial velocity [m/s] at which gas enters the porous layers at position `x`.
+
+    Sum over the bottom inlets of the response to a line source with decay length `spreading_length`, in a periodic
+    or a closed strip; at most the fastest port velocity.
+    """
+    length, decay = case.geometry.length, spreading_length(case)
+    inlets = [inlet for inlet in case.geometry.inlets if inlet.side == "bottom"]
+    fastest = max((inlet.velocity for inlet in inlets), default=0.0)
+    total = sum(inlet.velocity * inlet.width for inlet in inlets)
+    if decay == 0.0:
+        return fastest
+    if decay > 1e3 * length:
+        return min(fastest, total / length)
+    velocity = 0.0
+    for inlet in inlets:
+        distance = abs(x - inlet.center)
+        images, period = [distance, length - distance], length
+        if not case.geometry.periodic:  # the walls mirror the inlet
+            images = [distance, 2 * length - distance, x + inlet.center, 2 * length - x - inlet.center]
+            period = 2 * length
+        shape = sum(math.exp(-image / decay) for image in images) / -math.expm1(-period / decay)
+        velocity += inlet.velocity * inlet.width * shape / (2.0 * decay)
+    return min(fastest, velocity)
+
+
+def courant(velocity: float, step: float, size: float) -> float:
+    """u dt / dx: cells passed in a step; the flow treats convection explicitly and wants it below 1."""
+    return abs(velocity) * step / size
+
+
+def flow_courant(case: Case, grid: Grid) -> float:
+    """Largest expected Courant number of the gas in a step of the vibration cycle.
+
+    Along x the gas layers lag the reactor by up to its peak horizontal velocity; along y gas passes ports and outlets.
+    """
+    vibration, geometry = Vibration.from_motion(case.motion), case.geometry
+    step = 1.0 / (case.motion.frequency * case.time.steps_per_cycle)
+    flow = sum(inlet.velocity * inlet.width for inlet in geometry.inlets)
+    out = flow / sum(outlet.width for outlet in geometry.outlets) if geometry.outlets else 0.0
+    vertical = max([out, *(inlet.velocity for inlet in geometry.inlets)])
+    across = [
+        dy
+        for dy, layer in zip(grid.dy, grid.row_layer, strict=True)
+        if geometry.layers[layer].material is None
+    ]
+    return max(
+        courant(vibration.ax * vibration.omega, step, grid.dx),
+        courant(vertical, step, min(across)) if across else 0.0,
+    )
+
+
+def numerical_diffusion(case: Case, grid: Grid) -> float:
+    """What exponential fitting adds to diffusion along x, as a share of the smallest diffusivity: (Pe/2) coth(Pe/2) - 1.
+
+    Pe = v dx tau^2 / D of a column, with the speed v at which gas may pass the columns of the mesh: that of the bed, which takes its gas
+    along, and the reactor's peak velocity where every phase is resolved. About Pe^2/12 in fine meshes.
+    """
+    vibration, speed = Vibration.from_motion(case.motion), abs(case.conveying_velocity)
+    if case.fidelity == "resolved":
+        speed += vibration.ax * vibration.omega
+    slowest = min(case.gas.diffusivity.values(), default=0.0)
+    if slowest == 0.0 or speed == 0.0:
+        return 0.0
+    bed = case.geometry.moving_layer
+    tortuosity = bed.material.tortuosity_factor[0] if bed is not None and bed.material is not None else 1.0
+    half = 0.5 * peclet(speed * tortuosity, grid.dx, slowest)
+    return half / math.tanh(half) - 1.0
+
+
+def expected_steps(case: Case) -> int:
+    """Time steps of a run (`mpm.motion.schedule`); 0 in steady."""
+    return 0 if case.fidelity == "steady" else Schedule.from_case(case).steps
+
+
+def expected_memory(case: Case, cells: int, ranks: int = 1) -> float:
+    """Peak memory [bytes] of a run over all ranks, from measurements on this program; good to a factor of 1.5."""
+    phases = case.time.steps_per_cycle if case.fidelity == "resolved" else 0
+    return ranks * MEMORY_OF_A_RANK + cells * (MEMORY_OF_A_CELL + phases * MEMORY_OF_A_CELL_AND_PHASE)

@@ -1,0 +1,125 @@
+"""The `[motion]` table of a case: vibration of the reactor and conveying of the bed, checked.
+
+`mpm.motion.kinematics` is what it makes them do.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, PrivateAttr, SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from mpm.case.geometry import Frozen
+from mpm.case.profile import PRESETS, BedProfile, read_profile
+from mpm.constants import GRAVITY
+from mpm.units import Angle, BedSpeed, Frequency, Instant, NonNegative, Velocity, reject
+
+SAME_FREQUENCY = 0.01
+"""Relative difference up to which a profile belongs to a vibration: a DEM's waveform may be fitted to a record of the same machine."""
+
+
+class Motion(Frozen):
+    """Vibration of the reactor and conveying of the bed."""
+
+    gamma: NonNegative = 0.30
+    """largest vertical acceleration of the reactor over g; 0: no vibration, the bed moves steadily at bed_velocity"""
+    frequency: Frequency = 16.0
+    """frequency of the vibration"""
+    angle: Angle = math.pi / 3.0
+    """direction of the vibration, counted from angle_from; it must have a vertical component"""
+    angle_from: Literal["horizontal", "vertical"] = "horizontal"
+    """what the angle is counted from"""
+    bed_velocity: BedSpeed = 0.013
+    """mean speed at which the bed is conveyed, relative to the reactor, to the right; 0: it stays. A profile file brings its own"""
+    profile: Annotated[str, Field(json_schema_extra={"presets": [*PRESETS]})] = "thesis"
+    """how the bed moves within a cycle: thesis (lift-off at liftoff_velocity), phases (liftoff_phase and contact_phase), or the path
+    of a CSV file from `mpm dem`"""
+    liftoff_velocity: Velocity = -0.004
+    """vertical velocity of the reactor at which the bed lifts off (profile thesis)"""
+    liftoff_phase: Angle | None = None
+    """phase of the cycle at which the bed lifts off, 0 deg to below 360 deg (profile phases)"""
+    contact_phase: Angle | None = None
+    """phase of the cycle at which the bed lands again, 0 deg to below 360 deg (profile phases)"""
+    inlet_frame: Literal["reactor", "lab"] = "reactor"
+    """what the inlets are fixed to: they ride on the reactor, or stand still in the laboratory while it moves over them"""
+    start: Instant = 0.05
+    """when vibration and conveying start"""
+    startup: Literal["developed", "impulsive"] = "developed"
+    """how a resolved run begins to vibrate: in the periodic state of the gas, or from rest with the true transient"""
+
+    _table: BedProfile | None = PrivateAttr(None)
+
+    @property
+    def table(self) -> BedProfile | None:
+        """The profile file's content; None without vibration or with a profile of phases."""
+        return self._table
+
+    @property
+    def mean_velocity(self) -> float:
+        """Cycle mean of the bed's velocity in the reactor's frame [m/s], negative to the left: the profile file's, else `bed_velocity`."""
+        return self.bed_velocity if self._table is None else self._table.mean
+
+    @property
+    def peak_vertical_velocity(self) -> float:
+        """Amplitude of the reactor's vertical velocity, Gamma g / w [m/s]."""
+        return self.gamma * GRAVITY / (2.0 * math.pi * self.frequency)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        low, high = (0.0, math.pi / 2.0)
+        steep = self.angle <= low if self.angle_from == "horizontal" else self.angle >= high
+        if not low <= self.angle <= high or steep:
+            raise reject(
+                f"{math.degrees(self.angle):g} deg from the {self.angle_from}",
+                "an angle from 0 deg to 90 deg that leaves a vertical component",
+                key="angle",
+            )
+        if self.profile not in PRESETS:
+            self._read_table()
+        elif self.gamma == 0.0:
+            pass  # nothing hops: a preset has no phases to check
+        elif self.profile == "thesis":
+            peak = self.peak_vertical_velocity
+            if not -peak < self.liftoff_velocity < 0.0:
+                raise reject(
+                    f"{self.liftoff_velocity:g} m/s",
+                    f"between 0 m/s and the reactor's peak velocity, {-peak:.4g} m/s",
+                    key="liftoff_velocity",
+                )
+        else:
+            for key in ("liftoff_phase", "contact_phase"):
+                value = getattr(self, key)
+                if value is None or not 0.0 <= value < 2.0 * math.pi:
+                    raise reject(
+                        "nothing" if value is None else f"{math.degrees(value):g} deg",
+                        'an angle from 0 deg to below 360 deg, e.g. "97.85 deg", for profile = "phases"',
+                        key=key,
+                    )
+            if self.liftoff_phase == self.contact_phase:
+                raise reject("the phase of lift-off", "another phase", key="contact_phase")
+        return self
+
+    def _read_table(self) -> None:
+        """Read the profile file; it must be one even where nothing vibrates, and of this frequency where something does."""
+        table = read_profile(Path(self.profile), "profile")
+        if self.gamma == 0.0:
+            return
+        made = table.conditions
+        if made is not None and abs(made.frequency - self.frequency) > SAME_FREQUENCY * self.frequency:
+            raise reject(
+                f"{self.profile}: a profile made at {made.frequency:.6g} Hz for a vibration at {self.frequency:.6g} Hz, in whose cycle its "
+                "bed would hop to another beat",
+                f'a profile made at {self.frequency:.6g} Hz, or frequency = "{made.frequency:.6g} Hz"',
+                key="profile",
+            )
+        self._table = table
+
+    @model_serializer(mode="wrap")
+    def _write_what_rules(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without `bed_velocity` where a profile file says how fast the bed moves."""
+        table: dict[str, Any] = handler(self)
+        if self._table is not None:
+            table.pop("bed_velocity", None)
+        return table

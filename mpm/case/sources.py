@@ -1,0 +1,298 @@
+"""Reading and writing of case files as plain tables, before and after they are validated.
+
+A case is put together from several sources: the file, the shared geometry that it names as `geometry.base`, the
+built-in materials and the reaction mechanism it refers to, and overrides by dotted key (`--set`, sweeps). They are
+merged here, later ones over earlier ones; entries of lists are matched by their `name`.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Collection, Mapping
+from copy import deepcopy
+from pathlib import Path
+from typing import Any, TypeGuard
+
+import tomli_w
+
+from mpm.case.materials import BUILT_IN
+from mpm.case.profile import PRESETS
+from mpm.errors import InputError
+from mpm.files import is_file, read_text
+from mpm.spelling import quotes_advice
+
+Table = dict[str, Any]
+
+DEEPEST = 30
+"""Levels of tables and lists in a file; a case needs five."""
+
+_ACTIVATION = ("b", "Ea", "reference_temperature")
+_REPLACES = {
+    "sticking": ("A",),
+    "A": ("sticking",),
+    "windows": ("start", "stop"),
+    "kozeny_constant": ("permeability",),
+    "permeability": ("kozeny_constant",),
+}
+"""A key written over a table removes the other ways to say the same from it."""
+
+
+def _replaced(table: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    """Keys of `table` that `key`, written over it, replaces; b and Ea of a rate constant go with it, not those of the same kind."""
+    rivals = tuple(rival for rival in _REPLACES.get(key, ()) if rival in table)
+    return (*rivals, *_ACTIVATION) if key in ("sticking", "A") and rivals else rivals
+
+
+def read_toml(path: Path) -> Table:
+    """Parse a TOML file; InputError when it is missing, unreadable or no TOML."""
+    return parse_toml(read_source(path), path)
+
+
+def read_source(path: Path) -> str:
+    """The text of an input file; InputError when it is missing or unreadable."""
+    try:
+        return read_text(path)
+    except FileNotFoundError:
+        raise InputError.at(path, "", "no such file", "the path of a TOML file") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError.at(path, "", f"an unreadable file ({reason})", "a TOML file") from None
+
+
+def parse_toml(text: str, source: str | Path) -> Table:
+    """Parse the text of a TOML file; InputError for what is none."""
+    try:
+        table = tomllib.loads(text)
+        if _deeper_than(DEEPEST, table):
+            raise ValueError(f"tables or lists nested more than {DEEPEST} deep")
+        return table
+    except tomllib.TOMLDecodeError as error:
+        found = f"a TOML syntax error ({error})"
+        raise InputError.at(source, "", found, f"valid TOML{quotes_advice(text, str(error))}") from None
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # an integer of 5,000 digits, a list in a list in a list ...
+        raise InputError.at(source, "", f"more than can be read ({error})", "valid TOML") from None
+
+
+def _deeper_than(levels: int, value: Any) -> bool:
+    """Whether tables and lists are nested in more than so many levels."""
+    if not isinstance(value, dict | list):
+        return False
+    inner = value.values() if isinstance(value, dict) else value
+    return levels == 0 or any(_deeper_than(levels - 1, entry) for entry in inner)
+
+
+def built_in_files(folder: str) -> dict[str, Path]:
+    """Names and paths of the files that come with mpm in `folder`: cases, meshes or mechanisms."""
+    package = Path(__file__).parents[1]
+    files = {
+        path.stem: path for place in (package, package.parent) for path in (place / folder).glob("*.toml")
+    }
+    return dict(sorted(files.items()))
+
+
+def find_file(folder: str, name: str, near: Path, source: str, key: str) -> Path:
+    """The file that `name` stands for: a path relative to the folder `near`, or a built-in of `folder`."""
+    built_in = built_in_files(folder)
+    path = near / name
+    if name in built_in and not is_file(path):
+        return built_in[name]
+    if not is_file(path):
+        raise InputError.at(
+            source,
+            key,
+            f"{name!r}, no such file",
+            f"a path, or one of {', '.join(built_in)}",
+            given=Path(name).name,
+            known=built_in,
+        )
+    return path.resolve()
+
+
+def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:
+    """Lay table `over` upon table `under`: tables merge by key, lists of named tables by name, all else is replaced."""
+    gone = {rival for key in over for rival in _replaced(under, key)}
+    result = {key: value for key, value in under.items() if key not in gone}
+    for key, value in over.items():
+        below = result.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            result[key] = merge(below, value)
+        elif _named(value) and _named(below):
+            result[key] = _merge_lists(below, value)
+        else:
+            result[key] = deepcopy(value)
+    return result
+
+
+def _named(value: Any) -> TypeGuard[list[Table]]:
+    return (
+        isinstance(value, list)
+        and bool(value)
+        and all(isinstance(v, Mapping) and isinstance(v.get("name"), str) for v in value)
+    )
+
+
+def _merge_lists(under: list[Table], over: list[Table]) -> list[Table]:
+    result = [dict(entry) for entry in under]
+    places = {entry["name"]: i for i, entry in enumerate(result)}
+    for entry in over:
+        place = places.pop(
+            entry["name"], None
+        )  # a second entry of the same name is appended, and found out later
+        if place is None:
+            result.append(deepcopy(dict(entry)))
+        else:
+            result[place] = merge(result[place], entry)
+    return result
+
+
+def set_key(data: Table, key: str, value: Any, source: str, kept: Collection[str] = ()) -> None:
+    """Set the entry at a dotted key such as `geometry.inlet.tma.velocity`; list entries are addressed by their name.
+
+    It replaces other ways to say the same, except for the `kept` dotted keys: those were set beside it.
+    """
+    node: Any = data
+    parts = key.split(".")
+    for i, part in enumerate(parts[:-1]):
+        place = ".".join(parts[: i + 1])
+        if isinstance(node, dict):
+            node = node.setdefault(part, {})
+        else:
+            node = _entry(node, part, place, source)
+        if not isinstance(node, (dict, list)):
+            raise InputError.at(source, key, f"{place} = {node!r}", f"a key; {place} has no parts")
+    if isinstance(node, list):
+        raise InputError.at(source, key, "a whole entry", "a key of that entry, such as name", given="")
+    value = value.tolist() if hasattr(value, "tolist") else value  # numpy scalars and arrays
+    for rival in _replaced(node, parts[-1]):
+        if ".".join((*parts[:-1], rival)) not in kept:
+            node.pop(rival, None)
+    node[parts[-1]] = deepcopy(value)
+
+
+def _entry(entries: list[Any], name: str, place: str, source: str) -> Any:
+    named = {str(entry.get("name")): entry for entry in entries if isinstance(entry, dict)}
+    if name not in named:
+        raise InputError.at(
+            source, place, f"no entry named {name!r}", f"one of {', '.join(named)}", known=named
+        )
+    return named[name]
+
+
+def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, source: str) -> Table:
+    """Put a complete table together from the file's own, everything it refers to, and the overrides.
+
+    Paths in the file are relative to `folder`; `source` is what messages call the file. Entries of a wrong type are
+    left as they are: validation, which comes next, says so.
+    """
+    result: Table = deepcopy(dict(data))
+    for key in ("geometry.base", "chemistry.mechanism"):  # these decide what the other keys refer to
+        if key in overrides:
+            set_key(result, key, overrides[key], source)
+    if "geometry" in result:
+        result["geometry"] = _with_base(result["geometry"], folder, source)
+    _insert_mechanism(result, folder, source)
+    gas = result.setdefault("gas", {})
+    if isinstance(gas, dict) and not isinstance(gas.get("diffusivity", {}), dict):
+        gas["diffusivity"] = {"default": gas["diffusivity"]}
+    for key, value in overrides.items():
+        set_key(result, key, value, source, overrides)
+    _insert_materials(result, source)
+    _spread_diffusivity(result)
+    profile = _table(result, "motion").get("profile", "thesis")
+    if isinstance(profile, str) and profile not in PRESETS:
+        path = folder / profile
+        result["motion"]["profile"] = str(path.resolve() if is_file(path) else path)
+    return result
+
+
+def _table(data: Mapping[str, Any], key: str) -> Table:
+    value = data.get(key, {})
+    return value if isinstance(value, dict) else {}
+
+
+def _with_base(geometry: Any, folder: Path, source: str, seen: tuple[Path, ...] = ()) -> Any:
+    """The geometry laid over the shared one that it names as its base, which may have a base itself."""
+    if not isinstance(geometry, dict) or not isinstance(geometry.get("base"), str):
+        return geometry
+    path = find_file("meshes", geometry["base"], folder, source, "geometry.base")
+    if path in seen:
+        raise InputError.at(source, "geometry.base", f"{path.name}, which leads back here", "another file")
+    shared = _with_base(read_toml(path).get("geometry", {}), path.parent, str(path), (*seen, path))
+    return merge(shared, {key: value for key, value in geometry.items() if key != "base"})
+
+
+def shared_geometry(
+    data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, source: str
+) -> Table:
+    """The geometry that a case names as its base, alone; empty without one."""
+    name = overrides.get("geometry.base", _table(data, "geometry").get("base"))
+    return _with_base({"base": name}, folder, source) if isinstance(name, str) else {}
+
+
+def mechanism_tables(
+    data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, source: str
+) -> Table:
+    """The tables of the mechanism that a case names, alone; empty for an inline one."""
+    name = overrides.get("chemistry.mechanism", _table(data, "chemistry").get("mechanism", "alumina"))
+    return {} if name == "inline" else read_toml(find_file("mechanisms", name, folder, source, ""))
+
+
+def _insert_mechanism(data: Table, folder: Path, source: str) -> None:
+    chemistry = data.setdefault("chemistry", {})
+    name = chemistry.setdefault("mechanism", "alumina") if isinstance(chemistry, dict) else None
+    if not isinstance(name, str) or name == "inline":
+        return
+    path = find_file("mechanisms", name, folder, source, "chemistry.mechanism")
+    data["chemistry"] = merge({"name": path.stem, **read_toml(path)}, chemistry)
+    if path != built_in_files("mechanisms").get(name):
+        data["chemistry"]["mechanism"] = (
+            "inline"  # the tables are all here now: the case no longer needs the file
+        )
+
+
+def _insert_materials(data: Table, source: str) -> None:
+    given = data.setdefault("material", {})
+    layers = _table(data, "geometry").get("layer", [])
+    if not isinstance(given, dict) or not isinstance(layers, list):
+        return
+    for layer in layers:
+        name = layer.get("material") if isinstance(layer, dict) else None
+        if not isinstance(name, str):
+            continue
+        if name not in given and name not in BUILT_IN:
+            known = list(dict.fromkeys((*given, *BUILT_IN)))
+            raise InputError.at(
+                source,
+                f"geometry.layer.{layer.get('name', '?')}.material",
+                repr(name),
+                f"a table [material.{name}], or one of {', '.join(known)}",
+                given=name,
+                known=known,
+            )
+        given.setdefault(name, {})
+    sites = list(_table(_table(data, "chemistry"), "site"))
+    for name, table in given.items():
+        if isinstance(table, dict):
+            given[name] = table = merge(BUILT_IN.get(name, {}), table)
+            coverage = table.setdefault("initial_coverage", dict.fromkeys(sites[:1], 1.0))
+            if isinstance(coverage, dict):
+                table["initial_coverage"] = {**dict.fromkeys(sites, 0.0), **coverage}
+
+
+def _spread_diffusivity(data: Table) -> None:
+    gas = _table(data, "gas")
+    values = gas.get("diffusivity", {})
+    if isinstance(values, (dict, str)):
+        values = {"default": values} if isinstance(values, str) else dict(values)
+        if "default" in values:
+            species = _table(_table(data, "chemistry"), "species")
+            values = {**dict.fromkeys(species, values.pop("default")), **values}
+        gas["diffusivity"] = values
+
+
+def write_toml(data: Mapping[str, Any]) -> str:
+    """Format a table as TOML; lists of tables come as `[[...]]`, everything else on its own line."""
+    return tomli_w.dumps(data, indent=2)

@@ -1,0 +1,69 @@
+"""Convection of the gas is explicit: how far the gas goes in a step, and when a flow has left all bounds because it goes too far."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.errors import ConvergenceError
+from mpm.mesh.strip import Strip
+from mpm.motion.kinematics import Vibration
+from mpm.parallel import largest
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+
+Floats = NDArray[np.float64]
+BOUND = 10.0  # times the speed that ports and motion give: no flow of a strip gets there, a diverging one passes it within some steps
+
+
+def driving_speed(case: Case) -> float:
+    """The speed that ports and motion give the gas [m/s]: the fastest port, or the reactor's swing with the bed's mean on top.
+
+    What the inlets feed, and what the swing displaces in the height of the strip, may have to leave through the narrowest outlet.
+    """
+    geometry, vibration = case.geometry, Vibration.from_motion(case.motion)
+    swing = math.hypot(vibration.ax, vibration.ay) * vibration.omega
+    moved = swing + abs(case.conveying_velocity)
+    fastest = max([moved, *(abs(inlet.velocity) + swing for inlet in geometry.inlets)])
+    if not geometry.outlets:
+        return fastest
+    height = sum(layer.height for layer in geometry.layers)
+    volume = sum(abs(inlet.velocity) * inlet.width for inlet in geometry.inlets) + moved * height
+    return max(fastest, volume / min(outlet.width for outlet in geometry.outlets))
+
+
+def courant_number(case: Case, strip: Strip, velocities: Floats, step: float) -> float:
+    """Largest (|u_x|/dx + |u_y|/dy) step/eps of any cell, from the superficial `velocities` (4, cells) [m/s]; collective."""
+    own = strip.owned
+    bottom, left, right, top = np.abs(velocities[:, :own])
+    solids = [layer.material for layer in case.geometry.layers]
+    porosity = np.array([1.0 if s is None else s.porosity for s in solids])[
+        np.asarray(strip.grid.row_layer)[strip.row[:own]]
+    ]
+    rate = np.maximum(left, right) / strip.grid.dx + np.maximum(bottom, top) / strip.height[:own]
+    return float(largest(strip.comm, [(rate / porosity).max(initial=0.0) * step])[0])
+
+
+def check_bounded(case: Case, strip: Strip, before: Floats, after: Floats, step: float) -> None:
+    """Raise ConvergenceError when the flow `after` a step of `step` [s] is out of all bounds or not a number; collective.
+
+    The message says which `time.steps_per_cycle` brings the Courant number well below 1: that of the flow `before`, slowed down to the
+    speed that ports and motion give it, within a factor of 2 because the fastest gas need not be where it would be in a good flow.
+    """
+    expected = driving_speed(case)
+    found = np.abs(after).max(initial=0.0)
+    speed, earlier = largest(
+        strip.comm, [found if np.isfinite(found) else np.inf, np.abs(before).max(initial=0.0)]
+    )
+    if speed <= BOUND * expected:
+        return
+    number = courant_number(case, strip, before, step) * min(1.0, expected / earlier if earlier else 1.0)
+    steps = case.time.steps_per_cycle
+    raise ConvergenceError(
+        f"the flow diverges, gas at {speed:.3g} m/s where ports and motion give {expected:.3g} m/s: it passes {number:.2g} cells in a "
+        f"step; take time.steps_per_cycle = {math.ceil(2.0 * steps * max(number, 1.0))} (found {steps}) or more"
+    )

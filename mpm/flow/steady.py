@@ -1,0 +1,93 @@
+"""The steady gas flow under constant forcing, convection included.
+
+Creeping flow is linear and always has a solution; what inertia adds is found by Newton's method. How far it has come is judged by the
+velocities: a residual says little, because the drag of a tight solid outweighs the shear of the gas beside it by any factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.errors import ConvergenceError
+from mpm.flow.problem import FlowProblem
+from mpm.motion.kinematics import REST, StepMotion
+
+Floats = NDArray[np.float64]
+CONVERGED = 1e-8  # last change of a velocity, relative to the fastest; the next one would be smaller by 1e-4 or better
+# change that is accepted once it no longer shrinks: what rounding of the pressure leaves, 1e-8 where a powder of a micron holds back 1 bar
+ROUNDING = 1e-5
+LIMIT = 15  # Newton steps from a creeping flow
+SHARE_LIMIT = 12  # and from a flow with less convection
+FIRST_SHARE, LEAST_SHARE = 0.25, 1.0 / 64.0  # steps of the share of convection
+
+
+@dataclass(frozen=True, eq=False)
+class FlowField:
+    """Velocities at the bottom, left, right and top of every local cell (4, cells) [m/s] and pressure (cells,) [Pa]."""
+
+    velocities: Floats
+    pressure: Floats
+
+    @classmethod
+    def of(cls, problem: FlowProblem) -> FlowField:
+        return cls(problem.velocities(), problem.pressure().copy())
+
+
+def steady_flow(problem: FlowProblem, motion: StepMotion = REST) -> FlowField:
+    """Steady flow with convection under constant forcing; leaves it in `problem.state`.
+
+    Newton's method from the creeping flow, with the factored creeping operator as preconditioner, so that one factor serves. Where that
+    does not arrive (ports at a Reynolds number of a hundred), the convection grows in steps. Raises ConvergenceError.
+    """
+    _creep(problem, motion)
+    try:
+        _newton(problem, motion, LIMIT)
+    except ConvergenceError:
+        _grow(problem, motion)
+    return FlowField.of(problem)
+
+
+def _creep(problem: FlowProblem, motion: StepMotion) -> None:
+    """The flow without convection."""
+    force = problem.convective_force()
+    force.set(0.0)
+    problem.settle(motion, force)
+
+
+def _newton(problem: FlowProblem, motion: StepMotion, limit: int, exact: bool = False) -> None:
+    change = np.inf
+    for _ in range(limit):
+        last, change = change, problem.newton_update(problem.steady_residual(motion), exact)
+        if change < CONVERGED or (change < ROUNDING and change > 0.5 * last):
+            return
+        if not np.isfinite(change):
+            break
+    raise ConvergenceError(f"steady flow: velocities still change by {change:.3g} after {limit} Newton steps")
+
+
+def _grow(problem: FlowProblem, motion: StepMotion) -> None:
+    """Follow the flow from none of its convection to all of it, each time with a factor of the Jacobian itself."""
+    problem.release()
+    _creep(problem, motion)
+    problem.release()
+    share, step = 0.0, FIRST_SHARE
+    try:
+        while share < 1.0:
+            aim, before = min(share + step, 1.0), problem.state.x.array.copy()
+            problem.convection_share.value = aim
+            try:
+                _newton(problem, motion, SHARE_LIMIT, exact=True)
+                share, step = aim, 1.5 * step
+            except ConvergenceError as error:
+                problem.state.x.array[:] = before
+                step *= 0.5
+                if step < LEAST_SHARE:
+                    raise ConvergenceError(
+                        f"steady flow: found with {share:.0%} of the gas's inertia, not with more; it may have no steady state at this "
+                        "speed: slower or wider ports, narrower cells there, or fidelity resolved with startup impulsive"
+                    ) from error
+    finally:
+        problem.convection_share.value = 1.0

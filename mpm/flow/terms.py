@@ -1,0 +1,152 @@
+"""The terms of the gas's momentum balance (see `mpm.flow.problem`), one function each, as UFL forms.
+
+Every function gives a term of the left-hand side with the unknown `u` (or `p`) and the test function `v` (or `q`), unless it says
+otherwise. `u` is superficial; SI units throughout. What is continuous across the face of a solid that moves with v_s, along it too,
+is neither u nor u/eps but the total volume flux of gas and solids, U = u + (1-eps) v_s: Darcy's flux u - eps v_s, seen from outside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from ufl import Form, avg, conditional, div, dot, dS, ds, dx, grad, inner, jump, lt
+
+from mpm.mesh.strip import Strip
+from mpm.numerics.fem import dolfinx
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+    from mpm.case.materials import Material
+
+Expr = Any  # of UFL, which has no types
+
+
+@dataclass(frozen=True)
+class Medium:
+    """What the gas flows through, as cell functions: density and viscosity are those of the carrier [SI].
+
+    `porosity` eps, `viscosity` mu_e, `resistance_x`, `resistance_y` mu/K [Pa s/m2], `moving_solid` 1 - eps in the moving layer and 0
+    elsewhere, `width` of the cells [m], `half_height` [m]: from a cell's centre to its bottom and top as shear feels it (see
+    `shear_distance`).
+    """
+
+    density: float
+    porosity: dolfinx.fem.Function
+    viscosity: dolfinx.fem.Function
+    resistance_x: dolfinx.fem.Function
+    resistance_y: dolfinx.fem.Function
+    moving_solid: dolfinx.fem.Function
+    width: float
+    half_height: dolfinx.fem.Function
+
+    @classmethod
+    def from_case(cls, case: Case, strip: Strip) -> Medium:
+        mu = case.gas.viscosity
+        layers = [case.geometry.layers[i] for i in strip.grid.row_layer]
+        solids = [layer.material for layer in layers]
+
+        def rows(name: str, values: list[float]) -> dolfinx.fem.Function:
+            return strip.cell_function(np.asarray(values), name)
+
+        return cls(
+            density=case.gas.density,
+            porosity=rows("porosity", [s.porosity if s else 1.0 for s in solids]),
+            viscosity=rows("viscosity", [mu * s.viscosity_ratio if s else mu for s in solids]),
+            resistance_x=rows("resistance_x", [mu / s.permeability[0] if s else 0.0 for s in solids]),
+            resistance_y=rows("resistance_y", [mu / s.permeability[1] if s else 0.0 for s in solids]),
+            moving_solid=rows(
+                "moving_solid",
+                [1.0 - s.porosity if s and l.moving else 0.0 for s, l in zip(solids, layers, strict=True)],
+            ),
+            width=strip.grid.dx,
+            half_height=rows(
+                "half_height", [shear_distance(h, s) for h, s in zip(strip.grid.dy, solids, strict=True)]
+            ),
+        )
+
+
+def shear_distance(height: float, solid: Material | None) -> float:
+    """Half the height of a row [m]; in a solid l tanh(height / (2 l)), with l = sqrt(K_x mu_e/mu).
+
+    Above and below a solid the gas is at rest with it beyond the Brinkman length l, microns for a powder and far less than a row. Half
+    the row would put the no-slip plane at the centre of the solid's outermost row, an error of first order. The length that is exact
+    for thin and for high rows keeps second order where l is resolved, and places the plane right where it is not.
+    """
+    if solid is None:
+        return 0.5 * height
+    length = float(np.sqrt(solid.permeability[0] * solid.viscosity_ratio))
+    return float(length * np.tanh(0.5 * height / length))
+
+
+def inertia(u: Expr, v: Expr, m: Medium) -> Form:
+    """(rho/eps) u . v, to be divided by the time step; here and in `convection` the thesis has eps on rho v in the first term alone."""
+    return (m.density / m.porosity) * inner(u, v) * dx
+
+
+def convection(u: Expr, v: Expr, m: Medium) -> Form:
+    """(rho/eps) u.grad w with w = u/eps, the velocity of the gas between the grains: (rho/eps^2) u.grad u within a layer.
+
+    Central in the jumps between cells. What gas brings along when it passes the face of a layer is its own velocity w, which is the same
+    on both sides of a moving bed, where u jumps from eps v_s to v_s: with jumps of u the flow would depend on the frame of the observer.
+    Gas that comes in through a port or outlet carries no tangential velocity. Central differences are safe while u h/nu < 2, which
+    `mpm check` reports.
+    """
+    n = ufl.FacetNormal(ufl.domain.extract_unique_domain(v))
+    c = m.density / m.porosity
+    un = dot(u, n)
+    incoming = conditional(lt(un, 0), un, 0)
+    degree = {"quadrature_degree": 2}
+    return (
+        inner(c / m.porosity * dot(grad(u), u), v) * dx(metadata=degree)
+        - dot(u("+"), n("+")) * inner(jump(u / m.porosity), avg(c * along(v, n))) * dS(metadata=degree)
+        - c / m.porosity * incoming * inner(along(u, n), v) * ds(metadata=degree)
+    )
+
+
+def along(v: Expr, n: Expr) -> Expr:
+    """The part of `v` along a facet with normal `n`."""
+    return v - dot(v, n) * n
+
+
+def viscosity(u: Expr, v: Expr, m: Medium, closed: ufl.Measure) -> Form:
+    """-div(mu_e grad u): normal derivatives in the cells, tangential ones as differences between neighbouring cells and to walls.
+
+    For the lowest order these differences are consistent as they stand; a penalty factor would multiply the viscosity. The equation has
+    U = u + (1-eps) v_s here: the share of the solids is in `bed_entrainment`.
+    """
+    n = ufl.FacetNormal(ufl.domain.extract_unique_domain(v))
+    half = (0.5 * m.width * n[0] ** 2 + m.half_height * n[1] ** 2) / m.viscosity
+    wall_u, wall_v = along(u, n), along(v, n)
+    return (
+        m.viscosity * inner(grad(u), grad(v)) * dx
+        + inner(jump(u), jump(v)) / (half("+") + half("-")) * dS
+        + inner(wall_u, wall_v) / half * closed
+    )
+
+
+def drag(u: Expr, v: Expr, m: Medium) -> Form:
+    """(mu/K) u, per direction; with `bed_entrainment` relative to a moving solid. The thesis (5-9) has -mu C |u| of the gas alone."""
+    return (m.resistance_x * u[0] * v[0] + m.resistance_y * u[1] * v[1]) * dx
+
+
+def pressure_and_continuity(u: Expr, p: Expr, v: Expr, q: Expr) -> Form:
+    """grad p (integrated by parts, p = 0 at outlets) and -div u = 0, symmetric."""
+    return -(p * div(v) + q * div(u)) * dx
+
+
+def bed_entrainment(solids: Expr, v: Expr, m: Medium, closed: ufl.Measure) -> Form:
+    """Right-hand side per unit bed velocity: (mu/K) eps v_s + div(mu_e grad((1-eps) v_s)), with `solids` = (1-eps) along x where v_s is.
+
+    The second part is the shear of the solids' volume flux, which makes U the velocity that is continuous at the face of the bed: the gas
+    there moves with v_s, as a wall would move it.
+    """
+    moving = conditional(lt(0.0, m.moving_solid), m.porosity, 0.0)
+    return moving * m.resistance_x * v[0] * dx - viscosity(solids, v, m, closed)
+
+
+def frame_acceleration(v: Expr, m: Medium) -> Form:
+    """Right-hand side per unit acceleration of the frame: -rho a_x."""
+    return -m.density * v[0] * dx

@@ -1,0 +1,1 @@
+"""What a newcomer asks: list, explain, new."""

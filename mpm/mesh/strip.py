@@ -1,0 +1,162 @@
+"""The strip as a dolfinx mesh whose topology is truly periodic, with the maps that everything else uses.
+
+Right-edge nodes are replaced by their left-edge partners in the cells' connectivity, so that the mesh closes on itself; every cell
+then owns its four geometry nodes, which keeps each cell's true coordinates although the seam's vertices have two places. Every
+finite element and every facet integral is periodic without constraints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.mesh.grid import Grid
+from mpm.mesh.msh import QuadMesh, build_mesh
+from mpm.numerics.fem import dolfinx
+from mpm.parallel import Scatter, is_root
+
+import basix.ufl  # isort: skip
+import ufl  # isort: skip
+from dolfinx.common import IndexMap  # isort: skip
+from mpi4py import MPI  # isort: skip
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+
+Ints = NDArray[np.int64]
+BOTTOM, LEFT, RIGHT, TOP = range(4)  # local facet numbers of a quadrilateral with tensor-ordered corners
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Faces between two cells, seen along the axes: flow from `behind` to `ahead` is positive.
+
+    `facet` (n,) local facet numbers, `behind`, `ahead` local cells, `vertical_flow` (n,) True where the normal is y.
+    """
+
+    facet: Ints
+    behind: Ints
+    ahead: Ints
+    vertical_flow: NDArray[np.bool_]
+
+
+class Strip:
+    """The distributed mesh of a case.
+
+    `mesh` is the dolfinx mesh; `cell` (local cells incl. ghosts,) gives each cell's number in the grid, `owned` the number of own
+    cells, `facets` (local cells, 4) the facets of each cell as bottom, left, right, top. `scatter` moves cell values to and from
+    grid order.
+    """
+
+    def __init__(self, case: Case, comm: MPI.Comm, quads: QuadMesh | None = None):
+        self.comm = comm
+        self.grid = grid = Grid.from_case(case)
+        if quads is None and is_root(comm):
+            quads = build_mesh(case)
+        self.mesh = _periodic_mesh(grid, quads, comm)
+        topology = self.mesh.topology
+        cells = topology.index_map(2)
+        self.owned = cells.size_local
+        self.local = cells.size_local + cells.num_ghosts
+        self.cell = topology.original_cell_index.astype(np.int64)
+        self.global_cell = cells.local_to_global(np.arange(self.local, dtype=np.int32)).astype(np.int64)
+        self.row, self.column = np.divmod(self.cell, grid.columns)
+        topology.create_connectivity(2, 1)
+        topology.create_connectivity(1, 2)
+        self.facets = topology.connectivity(2, 1).array.reshape(-1, 4).astype(np.int64)
+        self.scatter = Scatter(comm, self.cell[: self.owned], grid.cells)
+        self.height = grid.dy[self.row]
+        self.volume = self.height * grid.dx
+        self.faces = self._faces()
+
+    def _faces(self) -> Faces:
+        """Interior faces that touch an own cell."""
+        index_map = self.mesh.topology.index_map(1)
+        count = index_map.size_local + index_map.num_ghosts
+        behind, ahead = np.full(count, -1), np.full(count, -1)
+        vertical = np.zeros(count, dtype=bool)
+        everyone = np.arange(self.local)
+        behind[self.facets[:, RIGHT]] = everyone
+        behind[self.facets[:, TOP]] = everyone
+        ahead[self.facets[:, LEFT]] = everyone
+        ahead[self.facets[:, BOTTOM]] = everyone
+        vertical[self.facets[:, TOP]] = True
+        vertical[self.facets[:, BOTTOM]] = True
+        inner = np.flatnonzero((behind >= 0) & (ahead >= 0))
+        mine = inner[(behind[inner] < self.owned) | (ahead[inner] < self.owned)]
+        return Faces(mine, behind[mine], ahead[mine], vertical[mine])
+
+    def wall_cells(self, side: str) -> Ints:
+        """Own cells along the bottom or top wall."""
+        row = 0 if side == "bottom" else self.grid.rows - 1
+        return np.flatnonzero(self.row[: self.owned] == row)
+
+    def wall_facets(self, side: str) -> Ints:
+        """The wall facets of `wall_cells(side)`, in the same order."""
+        return self.facets[self.wall_cells(side), BOTTOM if side == "bottom" else TOP]
+
+    def end_facets(self) -> Ints:
+        """Facets of own cells at the left and right ends; none where the strip is periodic."""
+        if self.grid.periodic:
+            return np.empty(0, np.int64)
+        first = np.flatnonzero(self.column[: self.owned] == 0)
+        last = np.flatnonzero(self.column[: self.owned] == self.grid.columns - 1)
+        return np.concatenate([self.facets[first, LEFT], self.facets[last, RIGHT]])
+
+    def cell_function(self, per_row: NDArray[np.float64], name: str) -> dolfinx.fem.Function:
+        """A DG0 function whose value depends on the row alone."""
+        function = dolfinx.fem.Function(dolfinx.fem.functionspace(self.mesh, ("DG", 0)), name=name)
+        dofs = function.function_space.dofmap.list[:, 0]
+        function.x.array[dofs] = np.asarray(per_row)[self.row]
+        return function
+
+
+def _periodic_mesh(grid: Grid, quads: QuadMesh | None, comm: MPI.Comm) -> dolfinx.mesh.Mesh:
+    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
+    if quads is None:
+        cells, nodes = np.empty((0, 4), np.int64), np.empty((0, 2))
+    else:
+        cells, nodes = quads.cells, quads.points
+        if grid.periodic:
+            cells = _glue_ends(grid, quads)
+    partitioner = dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.shared_facet, 2)
+    flat = dolfinx.mesh.create_mesh(comm, cells, element, nodes, partitioner)
+    topology = flat.topology
+    own = topology.index_map(2)
+    four = np.arange(4)
+    node_map = IndexMap(
+        comm,
+        4 * own.size_local,
+        (4 * own.ghosts[:, None] + four).ravel().astype(np.int64),
+        np.repeat(own.owners, 4).astype(np.int32),
+        1304,  # any tag of our own
+    )
+    count = own.size_local + own.num_ghosts
+    row, column = np.divmod(topology.original_cell_index, grid.columns)
+    corners = np.zeros((count, 4, 3))  # lower left, lower right, upper left, upper right
+    corners[:, [0, 2], 0] = grid.x[column][:, None]
+    corners[:, [1, 3], 0] = grid.x[column + 1][:, None]
+    corners[:, [0, 1], 1] = grid.y[row][:, None]
+    corners[:, [2, 3], 1] = grid.y[row + 1][:, None]
+    first = own.local_range[0]
+    identity = 4 * (np.concatenate([np.arange(first, first + own.size_local), own.ghosts])[:, None]) + four
+    geometry = dolfinx.mesh.create_geometry(
+        node_map,
+        np.arange(4 * count, dtype=np.int32).reshape(count, 4),
+        flat.geometry.cmaps[0],
+        np.ascontiguousarray(corners.reshape(-1, 3)[:, :2]),
+        identity.ravel().astype(np.int64),
+    )
+    cpp = dolfinx.cpp.mesh.Mesh_float64(comm, topology._cpp_object, geometry._cpp_object)
+    return dolfinx.mesh.Mesh(cpp, ufl.Mesh(element))
+
+
+def _glue_ends(grid: Grid, quads: QuadMesh) -> Ints:
+    """Connectivity in which the right-hand nodes are their left-hand partners."""
+    cells = quads.cells.copy().reshape(grid.rows, grid.columns, 4)
+    cells[:, -1, 1] = cells[:, 0, 0]
+    cells[:, -1, 3] = cells[:, 0, 2]
+    return cells.reshape(-1, 4)

@@ -1,0 +1,1 @@
+"""PETSc, MPI and the finite-element stack; knows no reactor."""

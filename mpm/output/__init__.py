@@ -1,0 +1,1 @@
+"""The directory of a run: writing, reading back, tables and fields."""

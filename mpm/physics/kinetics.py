@@ -1,0 +1,340 @@
+"""Rates of surface and gas reactions in many cells at once, implicit in the coverage.
+
+Surface reaction r consumes gas g(r) on sites s(r):  rate r_r = k_r(T) C_g theta_s  [mol/m2/s].
+Over a step dt the coverages of a cell follow its new concentrations,
+
+    theta' = theta + (dt/n_s) sum_r nu_r r_r(C', theta'),   that is   (I - dt Q(C')) theta' = theta,
+
+with Q a matrix whose off-diagonal entries are >= 0 and whose columns sum to zero, because every reaction conserves sites. Hence
+theta' >= 0 and sum theta' = sum theta for any C' >= 0 and any step: coverage stays within [0, 1] by construction. A negative
+concentration (a Newton iterate) leaves Q as it is at zero and enters all r_r linearly, which keeps the uptake monotone and concave.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mpm.physics.mechanism import GasReaction, SurfaceReaction
+
+if TYPE_CHECKING:
+    from mpm.physics.mechanism import Mechanism
+
+Floats = NDArray[np.float64]
+Reaction = SurfaceReaction | GasReaction
+
+
+@dataclass(frozen=True)
+class Roles:
+    """Which species a run has to follow.
+
+    `coupled` react and are solved together; `products` are only made (or inert) and follow one by one; all others stay absent
+    because nothing feeds or makes them.
+    """
+
+    coupled: tuple[str, ...]
+    products: tuple[str, ...]
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, fed: set[str]) -> Roles:
+        """Species that can appear when `fed` enter: a reaction runs once all its gas reactants are present."""
+        present = set(fed)
+        reactions: list[Reaction] = [*mechanism.surface_reactions, *mechanism.gas_reactions]
+        while True:
+            made = {
+                name
+                for reaction in reactions
+                if reactants(reaction) <= present
+                for name in stoichiometry(reaction)
+            }
+            if made <= present:
+                break
+            present |= made
+        running = [r for r in reactions if reactants(r) <= present]
+        reacting = {name for reaction in running for name in reactants(reaction)}
+        order = [name for name in mechanism.species_names if name in present]
+        return cls(tuple(n for n in order if n in reacting), tuple(n for n in order if n not in reacting))
+
+
+def reactants(reaction: Reaction) -> set[str]:
+    """Gas species whose concentrations set the rate of a surface or gas reaction."""
+    return {reaction.gas} if isinstance(reaction, SurfaceReaction) else set(reaction.reactants)
+
+
+def stoichiometry(reaction: Reaction) -> Mapping[str, float]:
+    """Signed gas stoichiometry of a surface or gas reaction, per event."""
+    return reaction.nu_gas if isinstance(reaction, SurfaceReaction) else reaction.nu
+
+
+@dataclass(frozen=True, eq=False)
+class Exposure:
+    """Solids conveyed through cells: mean `rates` (reactions, n) [mol/m2/s] with derivatives by concentration `rates_c`
+    (reactions, coupled, n) and by incoming coverage `rates_theta` (reactions, sites, n); outgoing coverage `out` (sites, n), likewise
+    `out_c` (sites, coupled, n) and `out_theta` (sites, sites, n)."""
+
+    rates: Floats
+    rates_c: Floats
+    rates_theta: Floats
+    out: Floats
+    out_c: Floats
+    out_theta: Floats
+
+
+class SurfaceKinetics:
+    """Surface reactions in `n` cells with area `surface` S [1/m] and `sites` n_s [mol/m2], temperature [K] scalar or per cell."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        coupled: tuple[str, ...],
+        surface: Floats,
+        sites: Floats,
+        temperature: ArrayLike,
+    ):
+        self.coupled, self.surface, self.sites = coupled, surface, sites
+        names = mechanism.site_names
+        self.reactions = [r for r in mechanism.surface_reactions if r.gas in coupled]
+        self.gas = [coupled.index(r.gas) for r in self.reactions]
+        self.site = [names.index(r.site) for r in self.reactions]
+        molar_mass = {s.name: s.molar_mass for s in mechanism.species}
+        t = np.broadcast_to(np.asarray(temperature, dtype=float), surface.shape)
+        self.constant = [
+            np.asarray(r.rate_constant(t, molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions
+        ]
+        self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
+            -1, len(names)
+        )
+        self.nu_gas = np.array([[r.nu_gas.get(k, 0.0) for k in coupled] for r in self.reactions]).reshape(
+            len(self.reactions), len(coupled)
+        )
+
+    def part(self, chosen: NDArray[np.integer]) -> SurfaceKinetics:
+        """The same reactions in some of the cells."""
+        other = copy.copy(self)
+        other.surface, other.sites = self.surface[chosen], self.sites[chosen]
+        other.constant = [constant[chosen] for constant in self.constant]
+        return other
+
+    def coverage(self, concentration: Floats, theta: Floats, dt: float) -> Floats:
+        """theta' (sites, n) after `dt` [s] at the new concentrations (coupled, n) [mol/m3]."""
+        rates = self._site_rates(concentration)
+        if len(theta) == 2:
+            return self._two_sites(rates, theta, dt)[0]
+        return np.minimum(self._solve_sites(rates, dt, theta[:, None, :])[:, 0], 1.0)
+
+    def rates(self, concentration: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
+        """Rates r_r (reactions, n) [mol/m2/s] at the end of the step and their derivatives (reactions, coupled, n) [m/s]."""
+        site_rates = self._site_rates(concentration)
+        k = len(theta)
+        if k == 2:
+            new, response = self._two_sites(site_rates, theta, dt)
+        else:
+            identity = np.broadcast_to(np.eye(k)[:, :, None], (k, *theta.shape))
+            inverse = self._solve_sites(site_rates, dt, identity)
+            new = np.einsum("ksn,sn->kn", inverse, theta)
+            # d theta'/d q_r = (I - dt Q)^-1 dt nu_r theta'_s(r)
+            response = dt * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, new[self.site])
+        values = np.empty((len(self.reactions), concentration.shape[1]))
+        slopes = np.zeros((len(self.reactions), *concentration.shape))
+        for r, (g, s) in enumerate(zip(self.gas, self.site, strict=True)):
+            values[r] = self.constant[r] * concentration[g] * new[s]
+            slopes[r, g] += self.constant[r] * new[s]
+            for other, j in enumerate(self.gas):
+                factor = self.constant[r] * self.constant[other] / self.sites * response[other, s]
+                _respond(values[r], slopes[r], concentration, g, j, factor)
+        return values, slopes
+
+    def conveyed(self, concentration: Floats, theta: Floats, time: Floats | float) -> Exposure:
+        """Solids that pass a cell in `time` [s, scalar or (n,)] at constant concentrations, coming in with `theta` (sites, n).
+
+        Two kinds of sites: exact, d theta_0/dt = c (1 - theta_0) - a theta_0, so theta_out = theta_in exp(-a - c) + c phi_1(a + c)
+        with a and c the turnovers over `time`; with one reaction that is theta_out = theta_in exp(-nu k C time/n_s). More kinds: implicit
+        in the outgoing coverage. Mean rates and outgoing coverage balance exactly in both.
+        """
+        rates = self._site_rates(concentration)
+        k, count = len(theta), len(self.reactions)
+        unit = np.eye(k)
+        if k == 2:
+            gain, share = self._gains(rates, theta, time)
+            turnover = gain[0] + gain[1]
+            decay, one, two = np.exp(-turnover), phi1(turnover), phi2(turnover)
+            out, mean = theta * decay + gain * one, theta * one + gain * two
+            slope_one = dphi1(turnover)
+            slope_two = dphi2(turnover)
+            out_q, mean_q = np.empty((count, *theta.shape)), np.empty((count, *theta.shape))
+            for r, s in enumerate(self.site):
+                through = share[r, 1 - s]  # d turnover / d q_r
+                out_q[r] = through * (-theta * decay + gain * slope_one)
+                mean_q[r] = through * (theta * slope_one + gain * slope_two)
+                out_q[r, 1 - s] += through * one
+                mean_q[r, 1 - s] += through * two
+            out_theta = unit[:, :, None] * decay
+            mean_theta = unit[:, :, None] * one
+        else:
+            span = np.broadcast_to(np.asarray(time, dtype=float), theta.shape[1:])
+            inverse = self._solve_sites(rates, span, np.broadcast_to(unit[:, :, None], (k, *theta.shape)))
+            out = mean = np.einsum("ksn,sn->kn", inverse, theta)
+            out_q = mean_q = span * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, out[self.site])
+            out_theta = mean_theta = inverse
+        values = np.stack(
+            [self.constant[r] * concentration[g] * mean[s] for r, (g, s) in enumerate(self._pairs())]
+        )
+        slopes = np.zeros((count, *concentration.shape))
+        out_c = np.zeros((k, *concentration.shape))
+        values_theta = np.zeros((count, *theta.shape))
+        for r, (g, s) in enumerate(self._pairs()):
+            slopes[r, g] += self.constant[r] * mean[s]
+            values_theta[r] = self.constant[r] * concentration[g] * mean_theta[s]
+            for other, j in enumerate(self.gas):
+                factor = self.constant[r] * self.constant[other] / self.sites * mean_q[other, s]
+                _respond(values[r], slopes[r], concentration, g, j, factor)
+        for other, j in enumerate(self.gas):
+            out_c[:, j] += out_q[other] * (self.constant[other] / self.sites * (concentration[j] > 0.0))
+        return Exposure(values, slopes, values_theta, out, out_c, out_theta)
+
+    def _pairs(self) -> list[tuple[int, int]]:
+        return list(zip(self.gas, self.site, strict=True))
+
+    def _gains(self, rates: Floats, theta: Floats, time: Floats | float) -> tuple[Floats, Floats]:
+        """For two kinds: turnover into each kind over `time` (2, n), and its derivative by each q_r (reactions, 2, n or 1)."""
+        span = np.atleast_1d(np.asarray(time, dtype=float))
+        gain = np.zeros_like(theta)
+        share = np.zeros((len(self.reactions), 2, len(span)))
+        for r, s in enumerate(self.site):
+            share[r, 1 - s] = span * self.nu_site[r, 1 - s]
+            gain[1 - s] += share[r, 1 - s] * rates[r]
+        return gain, share
+
+    def _site_rates(self, concentration: Floats) -> Floats:
+        """q_r = k_r C_g / n_s [1/s], never negative."""
+        rates = np.empty((len(self.reactions), concentration.shape[1]))
+        for r, g in enumerate(self.gas):
+            rates[r] = self.constant[r] * np.maximum(concentration[g], 0.0) / self.sites
+        return rates
+
+    def _solve_sites(self, rates: Floats, dt: Floats | float, rhs: Floats) -> Floats:
+        """Solve (I - dt Q) x = rhs for any number of sites; dt scalar or (n,), rhs and x (sites, m, n), rhs >= 0.
+
+        Elimination without subtraction (Grassmann, Taksar and Heyman 1985): only the turnovers from site to site and the column sums
+        enter, all positive, so sites are conserved to rounding however much faster than the step the reactions are.
+        """
+        k = len(rhs)
+        turnover = dt * np.einsum("rk,rn,rs->ksn", self.nu_site, rates, np.eye(k)[self.site].reshape(-1, k))
+        column_sum = np.ones((k, rates.shape[1]))
+        pivot = np.empty_like(column_sum)
+        x = rhs.copy()
+        for i in range(k):
+            later = slice(i + 1, None)
+            pivot[i] = column_sum[i] + turnover[later, i].sum(axis=0)
+            share = turnover[later, i] / pivot[i]
+            column_sum[later] += turnover[i, later] * column_sum[i] / pivot[i]
+            x[later] += share[:, None] * x[i]
+            turnover[later, later] += share[:, None] * turnover[i, None, later]
+        for i in reversed(range(k)):
+            x[i] = (x[i] + np.einsum("sn,smn->mn", turnover[i, i + 1 :], x[i + 1 :])) / pivot[i]
+        return x
+
+    def _two_sites(self, rates: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
+        """Closed form for two kinds of sites: theta' (2, n) and d theta'/d q_r (reactions, 2, n).
+
+        theta_0' = (theta_0 + c) / (1 + a + c) and its complement, with a and c the turnover of either kind; as written, each stays in
+        [0, 1] in floating point too, because rounding is monotone.
+        """
+        gain, share = self._gains(rates, theta, dt)
+        whole = np.stack([(1.0 + gain[1]) + gain[0], (1.0 + gain[0]) + gain[1]])
+        new = (theta + gain) / whole
+        response = np.empty((len(self.reactions), *theta.shape))
+        for r, s in enumerate(self.site):
+            change = share[r, 1 - s] * new[s] / whole[0]
+            response[r, 1 - s], response[r, s] = change, -change
+        return new, response
+
+
+class GasKinetics:
+    """Second-order gas reactions among the coupled species: rate k(T) C_1 C_2 [mol per m3 of gas per s].
+
+    Per total volume that is eps k C_1 C_2; the thesis (5-12) prints the source in its porous zones without eps.
+    """
+
+    def __init__(self, mechanism: Mechanism, coupled: tuple[str, ...], temperature: ArrayLike):
+        self.coupled = coupled
+        self.reactions = [r for r in mechanism.gas_reactions if reactants(r) <= set(coupled)]
+        self.constant = [r.rate_constant(np.asarray(temperature, dtype=float)) for r in self.reactions]
+        self.pairs = []
+        for r in self.reactions:
+            a, b = [name for name, order in r.reactants.items() for _ in range(int(order))]
+            self.pairs.append((coupled.index(a), coupled.index(b)))
+
+    def rates(self, concentration: Floats) -> tuple[Floats, Floats]:
+        """Rates (reactions, n) and derivatives (reactions, coupled, n); negative concentrations count as none."""
+        positive = np.maximum(concentration, 0.0)
+        values = np.empty((len(self.reactions), concentration.shape[1]))
+        slopes = np.zeros((len(self.reactions), *concentration.shape))
+        for r, (a, b) in enumerate(self.pairs):
+            values[r] = self.constant[r] * positive[a] * positive[b]
+            slopes[r, a] += self.constant[r] * positive[b] * (concentration[a] > 0.0)
+            slopes[r, b] += self.constant[r] * positive[a] * (concentration[b] > 0.0)
+        return values, slopes
+
+
+def _respond(rate: Floats, slopes: Floats, concentration: Floats, g: int, j: int, factor: Floats) -> None:
+    """Add to a rate of gas `g` (n,) and its `slopes` (coupled, n) what the coverage's response to C_j brings, factor C_g per unit C_j.
+
+    Where C_j < 0 the rate follows its tangent at zero. Solids at rest that see both precursors turn over at a harmonic mean of the two
+    supplies, which is concave; its tangents keep it so beyond zero, where a rate that ignored C_j would have a kink that stalls Newton.
+    """
+    own = concentration[g]
+    if j == g:
+        slopes[j] += factor * own * (own > 0.0)
+    else:
+        slope = factor * np.maximum(own, 0.0)
+        slopes[j] += slope
+        rate += slope * np.minimum(concentration[j], 0.0)
+
+
+def phi1(x: Floats) -> Floats:
+    """(1 - exp(-x)) / x for x >= 0."""
+    return _series(
+        x,
+        lambda v: -np.expm1(-v) / v,
+        (1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0, -1.0 / 720.0, 1.0 / 5040.0),
+    )
+
+
+def phi2(x: Floats) -> Floats:
+    """(1 - phi1(x)) / x for x >= 0."""
+    return _series(
+        x,
+        lambda v: (1.0 + np.expm1(-v) / v) / v,
+        (1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0, 1.0 / 720.0, -1.0 / 5040.0, 1.0 / 40320.0),
+    )
+
+
+def dphi1(x: Floats) -> Floats:
+    """Derivative of phi1."""
+    return _series(
+        x,
+        lambda v: (np.exp(-v) + np.expm1(-v) / v) / v,
+        (-1.0 / 2.0, 1.0 / 3.0, -1.0 / 8.0, 1.0 / 30.0, -1.0 / 144.0, 1.0 / 840.0, -1.0 / 5760.0),
+    )
+
+
+def dphi2(x: Floats) -> Floats:
+    """Derivative of phi2."""
+    return _series(
+        x,
+        lambda v: -((np.exp(-v) + np.expm1(-v) / v) / v + (1.0 + np.expm1(-v) / v) / v) / v,
+        (-1.0 / 6.0, 1.0 / 12.0, -1.0 / 40.0, 1.0 / 180.0, -1.0 / 1008.0, 1.0 / 6720.0, -1.0 / 51840.0),
+    )
+
+
+def _series(x: Floats, closed: Callable[[Floats], Floats], coefficients: tuple[float, ...]) -> Floats:
+    """`closed` away from 0, its Taylor polynomial where cancellation would spoil it; what that leaves out is below rounding."""
+    small = x < 0.02
+    polynomial = np.polynomial.polynomial.polyval(x, coefficients)
+    return np.where(small, polynomial, closed(np.where(small, 1.0, x)))

@@ -1,0 +1,1 @@
+"""Pictures, movies, ParaView scripts, and how objects show themselves in a notebook."""

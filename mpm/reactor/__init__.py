@@ -1,0 +1,1 @@
+"""The coupling: one step after the other, the steady state, restart states."""

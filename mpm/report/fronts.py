@@ -1,0 +1,269 @@
+"""Where precursors stand, where they have gone astray, and what has grown: the numbers of a run that look at places.
+
+Everything is defined in the docstring of the function that computes it and named as in `summary.json` and `history.csv`. Amounts are per
+metre of depth. A number that does not exist, such as a front in a layer that the precursor has not reached, is left out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.mesh.grid import ON_EDGE, Grid
+from mpm.report.balances import FLOOR
+from mpm.report.coating import (
+    State,
+    Totals,
+    conveyed_layer,
+    dosed_species,
+    let_out,
+    running_gas,
+    running_surface,
+    titrated,
+)
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case, Inlet
+
+Floats = NDArray[np.float64]
+
+
+def crossing(distance: Floats, values: Floats, level: float) -> float | None:
+    """First distance at which `values`, which begin above `level`, fall to it (linear between points); None when they do not.
+
+    Also None when the first value lies below the level already: then there is no front to follow from there.
+    """
+    below = np.flatnonzero(values < level)
+    if len(below) == 0 or below[0] == 0:
+        return None
+    i = int(below[0])
+    share = (values[i - 1] - level) / (values[i - 1] - values[i])
+    return float(distance[i - 1] + share * (distance[i] - distance[i - 1]))
+
+
+def column_of(grid: Grid, x: float, towards: int) -> int:
+    """The column that holds `x` [m]; on the edge of two the right (`towards` +1) or the left (-1) one, whatever rounding says."""
+    place = (x - grid.x[0]) / grid.dx
+    edge = round(place)
+    column = int(place) if abs(place - edge) > ON_EDGE else edge - (towards < 0)
+    return min(max(column, 0), grid.columns - 1)
+
+
+def walk(grid: Grid, start: float, direction: int) -> tuple[Floats, NDArray[np.int64]]:
+    """Distances from `start` [m] and columns met when walking along the strip to the right (+1) or left (-1).
+
+    Once around a periodic strip, to the wall of a closed one. The first is the column that holds `start`, or ends there.
+    """
+    first = column_of(grid, start, -direction)
+    count = grid.columns if grid.periodic else (grid.columns - first if direction > 0 else first + 1)
+    steps = np.arange(count)
+    centre = grid.x[0] + (first + 0.5) * grid.dx
+    distance = direction * (centre - start) + steps * grid.dx
+    return distance, (first + direction * steps) % grid.columns
+
+
+def layer_mean(grid: Grid, field: Floats, layer: str) -> Floats:
+    """Mean over the height of a layer of a field (rows, columns); (columns,)."""
+    rows = grid.layer_rows(layer)
+    heights = grid.dy[rows]
+    return np.asarray(heights @ field[rows] / heights.sum())
+
+
+def front(grid: Grid, profile: Floats, feed: float, center: float, along: int = 1) -> dict[str, float]:
+    """Fronts of a concentration profile (columns,) around an inlet at `center` [m] that feeds `feed` [mol/m3]; solids go `along` +x or -x.
+
+    `upstream`, `downstream`: distance [m] from the inlet's centreline against and along the conveying direction at which the
+    profile falls to half the feed; `upstream_width`: distance between 90 and 10 % of its largest value, upstream of that value, where that
+    is at least FLOOR of the feed: less is no front but the far end of one.
+    """
+    result: dict[str, float] = {}
+    for name, direction in (("upstream", -along), ("downstream", along)):
+        distance, columns = walk(grid, center, direction)
+        at = crossing(distance, profile[columns], 0.5 * feed)
+        if at is not None:
+            result[name] = at
+    top = int(np.argmax(profile))
+    if profile[top] > FLOOR * feed:
+        distance, columns = walk(grid, grid.x[top] + 0.5 * grid.dx, -along)
+        values = profile[columns] / profile[top]
+        high, low = crossing(distance, values, 0.9), crossing(distance, values, 0.1)
+        if high is not None and low is not None:
+            result["upstream_width"] = low - high
+    return result
+
+
+def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
+    """Per dosing inlet and layer: the fronts of its precursor's height-averaged concentration (see `front`).
+
+    In layers with reactive surface also `coverage` [m], see `coverage_front`, of the site species that its half-reactions make.
+    `height`: the y [m] at which the precursor in the column of the centreline, seen from the inlet, falls to half its feed.
+    """
+    result: dict[str, dict[str, Any]] = {}
+    for inlet in case.geometry.inlets:
+        species = dosed_species(case, inlet)
+        if species is None or species not in state.concentration:
+            continue
+        field = state.concentration[species]
+        feed = case.feed_concentrations(inlet.mass_fractions)[species]
+        made = titrated(case, species, state.theta)
+        entry: dict[str, Any] = {}
+        for layer in case.geometry.layers:
+            numbers = front(grid, layer_mean(grid, field, layer.name), feed, inlet.center, case.direction)
+            coverage = _layer_coverage(grid, state, made, layer.name)
+            if coverage is not None:
+                incoming = None
+                if layer.moving and case.geometry.bed_inflow == "fresh" and layer.material is not None:
+                    fresh = layer.material.initial_coverage
+                    incoming = sum(fresh.get(site, 0.0) for site in case.mechanism.titrated_sites(species))
+                at = coverage_front(grid, coverage, inlet.center, incoming, case.direction)
+                if at is not None:
+                    numbers["coverage"] = at
+            if numbers:
+                entry[layer.name] = numbers
+        height = _height(grid, field, 0.5 * feed, inlet, case.direction)
+        if height is not None:
+            entry["height"] = height
+        if entry:
+            result[inlet.name] = entry
+    return result
+
+
+def coverage_front(
+    grid: Grid, profile: Floats, center: float, incoming: float | None = None, along: int = 1
+) -> float | None:
+    """Distance [m] upstream of an inlet's centreline at which a height-averaged coverage (columns,) passes 1/2; solids go `along` +x or -x.
+
+    Negative when the coverage at the centreline is below 1/2 already: the front then lies that far downstream. `incoming` is the
+    coverage with which solids enter at the end they come from; they do not come round from the other then. None where there is no front.
+    """
+    upstream = _half(grid, profile, center, -along, incoming)
+    if upstream is not None:
+        return upstream
+    downstream = _half(grid, 1.0 - profile, center, along, None if incoming is None else 1.0)
+    return None if downstream is None else -downstream
+
+
+def _half(grid: Grid, profile: Floats, center: float, direction: int, edge: float | None) -> float | None:
+    """Distance from `center` at which `profile` falls to 1/2; with `edge`, its value at that end of the strip, the walk stops there."""
+    distance, columns = walk(grid, center, direction)
+    values = profile[columns]
+    if edge is not None:
+        end = center - grid.x[0] if direction < 0 else grid.x[-1] - center
+        inside = distance < end
+        distance, values = np.append(distance[inside], end), np.append(values[inside], edge)
+    return crossing(distance, values, 0.5)
+
+
+def _layer_coverage(grid: Grid, state: State, theta: Floats, layer: str) -> Floats | None:
+    """Height mean of a coverage (reactive rows, columns) over a layer; None when the layer has no reactive surface."""
+    rows = grid.layer_rows(layer)
+    inside = (state.reactive_rows >= rows.start) & (state.reactive_rows < rows.stop)
+    if not inside.any():
+        return None
+    heights = grid.dy[state.reactive_rows[inside]]
+    return np.asarray(heights @ theta[inside] / heights.sum())
+
+
+def _height(grid: Grid, field: Floats, level: float, inlet: Inlet, along: int) -> float | None:
+    """y at which the column above (or below) an inlet's centre crosses `level`, seen from the inlet."""
+    column = column_of(grid, inlet.center, along)
+    y = 0.5 * (grid.y[1:] + grid.y[:-1])
+    values = field[:, column]
+    at = crossing(y, values, level) if inlet.side == "bottom" else crossing(-y[::-1], values[::-1], level)
+    return at if at is None or inlet.side == "bottom" else -at
+
+
+def contamination(case: Case, grid: Grid, totals: Totals, state: State) -> dict[str, dict[str, float]]:
+    """Per zone and per precursor that this zone's own inlet does not dose: what has come over from other zones / all that has been fed.
+
+    What has come over is what the zone has consumed on surfaces and in the gas, has let out through its outlets and holds now in its
+    gas. It equals what has crossed the zone's ends, since the zone holds none at first. In the steady state, where amounts are per
+    second, what it holds does not count. An outlet belongs to the zone that holds its centre.
+    """
+    result: dict[str, dict[str, float]] = {}
+    porosity = np.array(
+        [layer.material.porosity if layer.material else 1.0 for layer in case.geometry.layers]
+    )[grid.row_layer]
+    weight = porosity * grid.dy * grid.dx
+    for species, field in state.concentration.items():
+        i = totals.names.index(species)
+        fed = float(totals.fed[:, i].sum())
+        if fed <= 0.0:
+            continue
+        for number, zone in enumerate(case.geometry.zones, start=1):
+            own = next((inlet for inlet in case.geometry.inlets if inlet.name == zone.inlet), None)
+            if own is not None and own.mass_fractions.get(species, 0.0) > 0.0:
+                continue
+            columns = grid.zone_of_column == number
+            amount = 0.0 if case.fidelity == "steady" else float(weight @ field[:, columns].sum(axis=1))
+            for index, reaction in enumerate(running_surface(case, totals.names)):
+                amount -= reaction.nu_gas.get(species, 0.0) * float(totals.surface[index][:, columns].sum())
+            for index, gas in enumerate(running_gas(case, totals.names)):
+                amount -= gas.nu.get(species, 0.0) * float(totals.gas[index, number])
+            for k, outlet in enumerate(case.geometry.outlets):
+                if zone.start <= outlet.center < zone.end:
+                    amount += float(totals.out[k, i] - totals.back[k, i])
+            result.setdefault(zone.name, {})[species] = max(amount, 0.0) / fed
+    return result
+
+
+def cvd_totals(case: Case, totals: Totals) -> dict[str, Any]:
+    """Events of the parasitic gas reactions over the run [mol/m]: `total`, and `total_in_zone` by zone."""
+    if not running_gas(case, totals.names):
+        return {}
+    per_zone = totals.gas.sum(axis=0)
+    zones = {zone.name: float(per_zone[number]) for number, zone in enumerate(case.geometry.zones, start=1)}
+    return {"total": float(per_zone.sum()), "total_in_zone": zones}
+
+
+def backflow(case: Case, totals: Totals, before: Totals | None) -> dict[str, dict[str, float]]:
+    """Per outlet: volume drawn back in over volume let out since `before` (None: since the start). A one-way outlet has 0."""
+    result = {}
+    for k, outlet in enumerate(case.geometry.outlets):
+        out = let_out(case, totals, before, k)
+        back = totals.back_volume[k] - (before.back_volume[k] if before else 0.0)
+        if out is not None:
+            result[outlet.name] = {"backflow": float(back / out)}
+    return result
+
+
+def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[str, dict[str, float]]:
+    """Per solid product: `amount` [mol/m] on all surfaces since the start and, for the conveyed layer, what has grown since `before`.
+
+    `per_area` [mol/m2]: what has grown in that layer over the particle surface S h s that has been conveyed meanwhile by a distance s;
+    in the developed state, growth per cycle. (Steady: both per second.)
+    Over the whole surface of the layer where it does not move. `thickness` [m] =
+    per_area M / density, where the mechanism's film has both. Absent while nothing is conveyed.
+    """
+    name = conveyed_layer(case)
+    result: dict[str, dict[str, float]] = {}
+    rows = np.zeros(len(totals.reactive_rows), dtype=bool)
+    area = 0.0
+    if name is not None:
+        layer = next(l for l in case.geometry.layers if l.name == name)
+        inside = grid.layer_rows(name)
+        rows = (totals.reactive_rows >= inside.start) & (totals.reactive_rows < inside.stop)
+        assert layer.material is not None
+        length = grid.length
+        if layer.moving and case.fidelity == "steady":
+            length = abs(case.motion.mean_velocity)
+        elif layer.moving:
+            length = case.direction * (totals.slid - (before.slid if before else 0.0))
+        area = layer.material.surface_to_volume * layer.height * length
+    for solid in case.mechanism.films:
+        amount = grown = 0.0
+        for index, reaction in enumerate(running_surface(case, totals.names)):
+            count = reaction.film.get(solid.name, 0.0)
+            amount += count * float(totals.surface[index].sum())
+            grown += count * float(
+                totals.surface[index][rows].sum() - (before.surface[index][rows].sum() if before else 0.0)
+            )
+        entry = {"amount": amount}
+        if area > 0.0:
+            entry["per_area"] = grown / area
+            if solid.density is not None and solid.molar_mass is not None:
+                entry["thickness"] = grown / area * solid.molar_mass / solid.density
+        result[solid.name] = entry
+    return result

@@ -1,0 +1,42 @@
+"""What a notebook shows of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from mpm.markup import paragraph, table
+from mpm.report.fieldnames import superscript
+from mpm.report.quantities import flatten, quantity
+from mpm.report.tables import shown
+from mpm.report.verdict import verdict
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+
+FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film")
+"""Sections of a summary that people look at first."""
+
+
+def result_html(case: Case, summary: Mapping[str, Any], where: str) -> str:
+    """The verdict on a run, its first numbers with their units, and how well its books close."""
+    if not summary:
+        return paragraph(case.title or "run", bold=True) + paragraph(f"not ended yet, in {where}")
+    lines = paragraph(case.title or "run", bold=True) + paragraph(verdict(case, summary))
+    return lines + table(result_rows(summary)) + (paragraph(f"in {where}") if where else "")
+
+
+def result_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Labels and values; of profiles nothing."""
+    steady, numbers = summary.get("fidelity") == "steady", flatten(summary)
+    chosen = [name for section in FIRST for name in numbers if name.split(".")[0] == section]
+    rows = [
+        (quantity(name, steady).label, superscript(shown(name, numbers, steady)))
+        for name in chosen
+        if ".exit_profile." not in name
+    ]
+    errors = {name: value for name, value in numbers.items() if name.endswith("balance_error")}
+    if errors:
+        worst = max(errors, key=lambda name: abs(errors[name]))
+        rows.append(("largest relative error of a balance", f"{errors[worst]:.1e} ({quantity(worst).label})"))
+    return rows

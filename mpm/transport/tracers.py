@@ -1,0 +1,73 @@
+"""Species that take no part in any reaction, in the steady state: one linear system per diffusivity.
+
+    div(u C - D grad C) = s + sum_k e_k c_k,     c_k = mean of C in the cells next to outlet k
+
+s is what inlets and reactions bring, e_k what outlet k draws back in [m2/s] where it does. The means belong to the unknown: with C_0 the
+field of s alone and G_k that of e_k, C = C_0 + sum_k c_k G_k, and the means follow from a dense system of as many unknowns as outlets
+draw in, (I - M G) c = M C_0 with M the mean next to each of them. Exact, however much of what leaves comes back.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.numerics.linear import DirectSolver
+from mpm.parallel import any_rank, total
+from mpm.transport.cell_matrix import StepMatrix
+
+if TYPE_CHECKING:
+    from mpm.transport.fluxes import FluxOperator, PortFlux
+    from mpm.transport.species import Transport
+
+Floats = NDArray[np.float64]
+
+
+def steady_fields(transport: Transport, operators: list[FluxOperator], supply: Floats) -> Floats:
+    """Concentrations (n, own cells) [mol/m3] under `supply` (n, own cells) [mol/m/s] from inlets and reactions; collective.
+
+    `operators` are those of the n species. Raises ConvergenceError.
+    """
+    fields = np.zeros_like(supply)
+    for operator in dict.fromkeys(operators):
+        alike = [i for i, o in enumerate(operators) if o is operator]
+        if any_rank(
+            transport.strip.comm, bool(np.any(supply[alike]))
+        ):  # without gas flow only 0 = 0 can be solved
+            fields[alike] = _fields(transport, operator, supply[alike])
+    return fields
+
+
+def _fields(transport: Transport, operator: FluxOperator, supply: Floats) -> Floats:
+    """Fields of species with the same operator."""
+    matrix = StepMatrix(transport.strip, transport.gas_volume, "tracers")
+    matrix.update(operator, np.inf)
+    solver = DirectSolver(matrix.cells.matrix, "steady species that do not react")
+
+    def solve(rhs: Floats) -> Floats:
+        matrix.y.array[:] = rhs
+        solver.solve(matrix.y, matrix.x)
+        return matrix.x.array.copy()
+
+    try:
+        own = np.stack([solve(rhs) for rhs in supply])
+        ports = list(operator.outlets.values()) if operator.drawn_in else []
+        if not ports:
+            return own
+        returned = np.stack([solve(_drawn_in(port, supply.shape[1])) for port in ports])
+    finally:
+        solver.destroy()
+    both, split = np.vstack([own, returned]), len(own)
+    sums = total(transport.strip.comm, [[*(both[:, p.cells] @ p.area), p.area.sum()] for p in ports])
+    means = sums[:, :-1] / sums[:, -1:]
+    drawn = np.linalg.solve(np.eye(len(ports)) - means[:, split:], means[:, :split])
+    return own + drawn.T @ returned
+
+
+def _drawn_in(port: PortFlux, cells: int) -> Floats:
+    """Supply of own cells when a port draws in gas of unit concentration."""
+    supply = np.zeros(cells)
+    supply[port.cells] = port.into
+    return supply
