@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import io
 import re
+import shlex
 import sys
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mpm.errors import printable
@@ -141,6 +143,22 @@ def duration(seconds: float) -> str:
             rest = whole % size // part
             return f"{whole // size} {large}" + (f" {rest} {small}" if rest else "")
     return f"{whole} s"
+
+
+def print_steps(steps: Sequence[tuple[str, str]], console: Console) -> None:
+    """Commands that can be copied, with what each does behind it as a comment or, where that leaves no room, above it."""
+    from rich.text import Text
+
+    say(console, "Next:")
+    column = max((len(command) for command, _ in steps if 2 * len(command) < console.width), default=0) + 2
+    for command, purpose in steps:
+        if len(command) < column:
+            say(console, together(f"{command:{column}}") + f"# {purpose}", 2, column)
+        else:
+            say(console, f"# {purpose}:", 2)
+            words = (together(shlex.quote(word)) for word in shlex.split(command))
+            lines = lines_of(" ".join(words), console.width - 2, 2)
+            console.print(Text(" \\\n".join(lines)), soft_wrap=True)
 
 
 class Sheet:

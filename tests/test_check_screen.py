@@ -14,7 +14,7 @@ from mpm.advice.screen import print_report
 from mpm.case.case import Case, load_case
 from mpm.case.marks import print_full
 from mpm.cli import main
-from mpm.cli.nextsteps import print_steps
+from mpm.screen import print_steps
 
 from .test_screen import text_of
 

@@ -75,7 +75,7 @@ def check(
         return
     from mpm.advice.screen import print_report
     from mpm.case.marks import print_full
-    from mpm.cli.nextsteps import print_steps
+    from mpm.screen import print_steps
 
     if full:
         print_full(loaded, screen())

@@ -98,8 +98,8 @@ def new(
     """
     if rank() != 0:
         return
-    from mpm.cli.nextsteps import print_steps
     from mpm.guide.newcase import write_new_case
+    from mpm.screen import print_steps
 
     path, schema = write_new_case(file, start)
     console = screen()

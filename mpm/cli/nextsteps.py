@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.text import Text
 
 from mpm.advice.checks import check_case
 from mpm.errors import ConvergenceError, Interrupted
 from mpm.report.tables import print_summary
 from mpm.report.verdict import verdict
-from mpm.screen import lines_of, say, together
+from mpm.screen import print_steps, say
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -41,20 +40,6 @@ def print_next_steps(directory: Path, summary: dict[str, Any], console: Console,
     console.print()
     say(console, f"Results: {directory}")
     print_steps(steps, console)
-
-
-def print_steps(steps: Sequence[tuple[str, str]], console: Console) -> None:
-    """Commands that can be copied, with what each does behind it as a comment or, where that leaves no room, above it."""
-    say(console, "Next:")
-    column = max((len(command) for command, _ in steps if 2 * len(command) < console.width), default=0) + 2
-    for command, purpose in steps:
-        if len(command) < column:
-            say(console, together(f"{command:{column}}") + f"# {purpose}", 2, column)
-        else:
-            say(console, f"# {purpose}:", 2)
-            words = (together(shlex.quote(word)) for word in shlex.split(command))
-            lines = lines_of(" ".join(words), console.width - 2, 2)
-            console.print(Text(" \\\n".join(lines)), soft_wrap=True)
 
 
 @contextmanager

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpm.advice.checks import check_case
-from mpm.cli.nextsteps import print_steps
 from mpm.files import write_picture
 from mpm.optimise import SLACK, Point, Search, states
 from mpm.report.quantities import quantity
 from mpm.report.tables import print_warnings
-from mpm.screen import number, say, together
+from mpm.screen import number, print_steps, say, together
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

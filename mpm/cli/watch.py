@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpm.case.case import load_case
-from mpm.cli.nextsteps import print_end, print_steps
+from mpm.cli.nextsteps import print_end
 from mpm.errors import ConvergenceError, Interrupted
 from mpm.files import locked
 from mpm.output.directory import FAILED, RunDirectory
 from mpm.output.following import look
 from mpm.report.tables import print_summary
-from mpm.screen import lines_of, say
+from mpm.screen import lines_of, print_steps, say
 
 if TYPE_CHECKING:
     from rich.console import Console

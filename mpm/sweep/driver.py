@@ -19,10 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from mpm.advice.checks import check_case
-from mpm.cli.nextsteps import print_steps
 from mpm.errors import InputError
 from mpm.files import lock, write_atomically
-from mpm.screen import screen
+from mpm.screen import print_steps, screen
 from mpm.sweep.board import Board, now, say
 from mpm.sweep.cluster import Pool, PoolLost, open_pool
 from mpm.sweep.layout import Layout, read_json
