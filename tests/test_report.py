@@ -239,6 +239,16 @@ def test_two_runs_side_by_side(zone: Path, weaker: Path, browser: Any) -> None:
     porous = np.array([layer.material is not None for layer in load_run(zone).case.geometry.layers])
     largest = np.abs(fields[1] - fields[0])[porous[load_run(zone).grid.row_layer]].max()
     assert page("Number(viewers[0].plots[2].dataset.largest)") == pytest.approx(largest, abs=1.1 / LEVELS)
+    for steps, seen in ((1.0, False), (3.0, True)):  # one level of the page's own encoding is no difference
+        found = page(
+            f"""(async () => {{
+                const field = {{ low: 0, high: 10, log: false, label: "p", unit: "Pa" }}, v = viewers[0], [one] = v.runs;
+                const values = (p) => Array.from({{ length: one.rows }}, () => Array(one.columns).fill(p));
+                await v.drawDifference([{{ field, values: values(5) }}, {{ field, values: values(5 + {steps} * 10 / 4094) }}]);
+                return Number(v.plots[2].dataset.largest) > 0;
+            }})()"""
+        )
+        assert found is seen
     page.move(0)
     assert page("Number(viewers[0].plots[2].dataset.largest)") == 0.0
 

@@ -40,7 +40,7 @@ function valueOf(field, level) {
 const plain = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
 
 // A title beside a colour bar, in lines that fit its length.
-const folded = (text) => plain(text).replace(/(.{14,}?) /g, "$1<br>");
+const folded = (text) => plain(text).replace(/(.{18,}?) /g, "$1<br>");
 
 class Viewer {
   constructor(element, film, others) {
@@ -281,6 +281,10 @@ class Comparison {
       largest = Math.max(largest, Math.abs(difference));
       return difference;
     }));
+    if (largest <= 1.01 * (valueOf(a.field, LEVELS) - valueOf(a.field, LEVELS - 1))) { // one level: rounding of the page
+      z.forEach((line) => line.forEach((value, column) => { if (value !== null) line[column] = 0; }));
+      largest = 0;
+    }
     const trace = first.heatmap({ ...a.field, low: -(largest || 1), high: largest || 1, colours: "RdBu" }, z, false);
     plot.dataset.largest = largest;
     await Plotly.react(plot, [trace], this.layout(first, plot), CONFIG);
