@@ -33,7 +33,7 @@ MAY_SEE = {
     "page": MODEL | {"mesh", "report", "output", "advice", "pictures", "sweep"},
     "reactor": PARTS | {"transport", "report", "output", "advice", "pictures", "page"},
     "dem": MODEL,
-    "guide": MODEL | {"report", "output", "dem"},
+    "guide": MODEL | {"report", "output", "dem", "sweep"},
     "cli": PARTS
     | {"report", "output", "advice", "pictures", "page", "sweep", "reactor", "dem", "guide", "door"},
 }

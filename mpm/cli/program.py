@@ -27,6 +27,8 @@ from mpm.screen import say, screen, spell_out
 
 _PATIENCE = 30.0
 """Seconds that a failing rank waits for the others to fail as well before it ends the whole job."""
+_FORWARDED = 0.5
+"""Seconds that a launcher needs to pass on what a rank has printed: it drops the rest when the job is aborted."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -98,6 +100,7 @@ def _end(status: int, line: str) -> int:
         if time.monotonic() > deadline:  # the others are in a call that this rank will never join
             if rank() != 0:
                 print(f"[rank {rank()}] {line}", file=sys.stderr, flush=True)
+                time.sleep(_FORWARDED)
             mpi.COMM_WORLD.Abort(status)
         time.sleep(0.01)
     return status
@@ -109,5 +112,6 @@ def _crash() -> NoReturn:
     mpi = sys.modules.get("mpi4py.MPI")
     if mpi is not None and mpi.Is_initialized() and not mpi.Is_finalized() and mpi.COMM_WORLD.size > 1:
         sys.stderr.flush()
+        time.sleep(_FORWARDED)
         mpi.COMM_WORLD.Abort(1)
     raise SystemExit(1)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from mpm.case.keys import Key, all_keys, find_keys, keys_of, unknown_key
 from mpm.errors import InputError
 from mpm.guide.catalogue import sections
+from mpm.guide.otherfiles import find_other_keys, other_keys
 from mpm.report.quantities import QUANTITIES, RATIO, Quantity, known, quantity
 
 _NAMES = {
@@ -35,9 +36,9 @@ def explain(name: str) -> list[Line]:
     """What is known of a name. Raises InputError with the nearest names when it is no key, no number and nothing that `mpm list` has."""
     keys = find_keys(name)
     numbers = [quantity(name)] if known(name) else _numbers(name)
-    lines: list[Line] = [] if keys or numbers else _built_in(name) or _field(name)
+    lines: list[Line] = [] if keys or numbers else _built_in(name) or _other(name) or _field(name)
     if not keys and not numbers and not lines:
-        others = [number.name for number in QUANTITIES]
+        others = [*(number.name for number in QUANTITIES), *(key.name for key in other_keys())]
         raise InputError(f"mpm explain: {unknown_key(name, others)}; mpm explain alone lists them all")
     for key in keys:
         lines += [*([_BLANK] if lines else []), *(_table(key) if key.is_table else _key(key))]
@@ -138,6 +139,31 @@ def _built_in(name: str) -> list[Line]:
             (2, entry.facts, 0),
         )
     ]
+
+
+def _other(name: str) -> list[Line]:
+    """A key of a sweep, powder or mechanism file."""
+    lines: list[Line] = []
+    found = find_other_keys(name)
+    for key in found:
+        lines += [
+            *([_BLANK] if lines else []),
+            (0, f"{key.name}, of {key.file} files", 4),
+            (2, key.description, 0),
+        ]
+        if key.is_table:
+            below = [
+                k.name.removeprefix(f"{key.name}.") for k in other_keys() if k.name.startswith(f"{key.name}.")
+            ]
+            lines.append((2, f"{'keys':<{_LABEL}}{', '.join(dict.fromkeys(below))}", _LABEL))
+        for label, text in (
+            ("one of", ", ".join(key.choices)),
+            ("default", _plain(key.default)),
+            ("in a file", f"{key.name.rpartition('.')[2]} = {key.example}" if key.example else ""),
+        ):
+            if text:
+                lines.append((2, f"{label:<{_LABEL}}{text}", _LABEL))
+    return lines
 
 
 def _field(name: str) -> list[Line]:
