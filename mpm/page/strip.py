@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from mpm.case.case import Case, Inlet, Outlet
 from mpm.output.results import fed_by
-from mpm.pictures.outline import OKABE_ITO
+from mpm.pictures.outline import OKABE_ITO, spread
 
 WIDTH = 860.0
 """Length of the strip."""
@@ -115,7 +115,7 @@ def _bands(case: Case, per_metre: float) -> list[Band]:
     tops = [0.0]
     for layer in layers:
         tops.append(tops[-1] + layer.height * per_metre)
-    middles = apart([0.5 * (a + b) for a, b in pairwise(tops)], LINE)
+    middles = spread([0.5 * (a + b) for a, b in pairwise(tops)], LINE)
     above = max(
         0.0, middles[-1] - tops[-1] + 0.5 * LINE
     )  # the names of thin layers must not run into the axis below
@@ -136,17 +136,6 @@ def _bands(case: Case, per_metre: float) -> list[Band]:
             )
         )
     return bands
-
-
-def apart(places: Sequence[float], distance: float) -> list[float]:
-    """Sorted places moved to at least `distance` from each other, half of it downwards and half upwards."""
-    down = list(places)
-    for i in range(1, len(down)):
-        down[i] = max(down[i], down[i - 1] + distance)
-    up = list(places)
-    for i in range(len(up) - 2, -1, -1):
-        up[i] = min(up[i], up[i + 1] - distance)
-    return [0.5 * (a + b) for a, b in zip(up, down, strict=True)]
 
 
 def port_lines(case: Case, port: Inlet | Outlet) -> tuple[str, ...]:
