@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -150,8 +149,7 @@ def _number_line(what: Quantity, numbers: Sequence[Mapping[str, float]]) -> Chan
 
 def comparison_data(page: ComparePage) -> Mapping[str, Any]:
     """For the page's script."""
-    same = all(a["x"] == b["x"] and a["y"] == b["y"] for a, b in pairwise(page.films))
-    return {"names": list(page.names), "films": list(page.films), "sameCells": same}
+    return {"names": list(page.names), "films": list(page.films)}
 
 
 def compare_html(page: ComparePage) -> str:

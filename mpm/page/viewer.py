@@ -132,7 +132,6 @@ def table(run: Run, shown: Film, found: list[Encoded]) -> dict[str, Any]:
         "fields": [one.table() for one in found],
         "streamLevels": [float(v) for v in stream_levels(run.grid, last)],
         "layers": [{"name": name, "top": top} for name, top in zip(run.grid.layer_names, edges, strict=True)],
-        "moving": next((layer.name for layer in geometry.layers if layer.moving), None),
         "ports": [
             {
                 "name": port.name,
