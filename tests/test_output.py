@@ -32,6 +32,8 @@ def grid() -> Grid:
         row_layer=np.array([0, 0, 1, 1, 1]),
         zone_of_column=np.repeat([1, 2, 3], 4),
         layer_names=("bed", "headspace"),
+        materials=(None, None),
+        moving=np.array([True, True, False, False, False]),
         periodic=True,
     )
 
@@ -296,7 +298,16 @@ def test_an_output_costs_the_same_however_many_there_are(
 ) -> None:
     """Fails when tables are written anew at every row: what an output time writes besides its fields must not grow, and the .pvd must list
     every step after each write."""
-    grid = Grid(np.linspace(0, 1, 3), np.linspace(0, 1, 2), np.zeros(1, int), np.ones(2, int), ("bed",), True)
+    grid = Grid(
+        np.linspace(0, 1, 3),
+        np.linspace(0, 1, 2),
+        np.zeros(1, int),
+        np.ones(2, int),
+        ("bed",),
+        (None,),
+        np.ones(1, bool),
+        True,
+    )
     directory, written = RunDirectory(tmp_path), 0
     directory.prepare()
     pwrite, replace = os.pwrite, write_atomically
@@ -378,7 +389,7 @@ import sys
 import numpy as np
 from mpm.mesh.grid import Grid
 from mpm.output.directory import RunDirectory
-grid = Grid(np.linspace(0, 1, 101), np.linspace(0, 1, 51), np.zeros(50, int), np.ones(100, int), ("bed",), True)
+grid = Grid(np.linspace(0, 1, 101), np.linspace(0, 1, 51), np.zeros(50, int), np.ones(100, int), ("bed",), (None,), np.ones(50, bool), True)
 directory = RunDirectory(sys.argv[1])
 directory.prepare()
 print("writing", flush=True)

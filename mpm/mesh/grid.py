@@ -6,6 +6,7 @@ The reactor is a two-dimensional strip, `x` along the reactor and `y` upwards. `
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from mpm.case.case import Case, Layer
+    from mpm.case.materials import Material
 
 Floats = NDArray[np.float64]
 ON_EDGE = 1e-6  # of a column: places as close to each other are one
@@ -34,7 +36,8 @@ class Grid:
     """Equal columns of width `dx`, rows graded within each layer.
 
     `x` (columns + 1) and `y` (rows + 1) are edges [m], `row_layer` the index of each row's layer, `zone_of_column` the number of
-    the zone that holds a column's centre (1, 2, ... in the order of the case; 0 where there is none).
+    the zone that holds a column's centre (1, 2, ... in the order of the case; 0 where there is none). `materials` are those of the
+    layers, None for gas; `moving` (rows,) tells which rows belong to the moving layer.
     """
 
     x: Floats
@@ -42,6 +45,8 @@ class Grid:
     row_layer: Ints
     zone_of_column: Ints
     layer_names: tuple[str, ...]
+    materials: tuple[Material | None, ...]
+    moving: NDArray[np.bool_]
     periodic: bool
 
     @classmethod
@@ -69,6 +74,10 @@ class Grid:
             row_layer=np.asarray(row_layer, dtype=np.int64),
             zone_of_column=zone,
             layer_names=tuple(layer.name for layer in geometry.layers),
+            materials=tuple(layer.material for layer in geometry.layers),
+            moving=np.repeat(
+                [layer.moving for layer in geometry.layers], [layer.cells for layer in geometry.layers]
+            ),
             periodic=geometry.periodic,
         )
 
@@ -102,6 +111,11 @@ class Grid:
     def volumes(self) -> Floats:
         """Area of each cell, row by row [m2, that is m3 per metre of depth]."""
         return np.repeat(self.dy, self.columns) * self.dx
+
+    def per_row(self, value: Callable[[Material], float], gas: float) -> Floats:
+        """What `value` says of the material of each row, (rows,); `gas` in rows without one."""
+        by_layer = [gas if material is None else value(material) for material in self.materials]
+        return np.asarray(by_layer, dtype=float)[self.row_layer]
 
     def layer_rows(self, name: str) -> slice:
         """Rows of the layer `name`."""
