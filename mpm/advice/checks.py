@@ -30,6 +30,7 @@ from mpm.physics.fluidisation import (
     wen_yu_minimum_fluidisation,
 )
 from mpm.physics.mechanism import mole_fractions
+from mpm.physics.porous import effective_diffusivity
 from mpm.physics.saturation import coverage_met, slowest_turnover, uptake
 
 SMEARED = 0.1
@@ -168,7 +169,9 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     mechanism, material = case.mechanism, bed.material
     met = coverage_met(mechanism, species, material.initial_coverage, gas.temperature) or {}
     k = uptake(mechanism, species, met, gas.temperature)
-    diffusivity = eng.effective_diffusivity(material, gas.diffusivity[species])
+    diffusivity = effective_diffusivity(
+        gas.diffusivity[species], material.porosity, material.tortuosity_factor[1]
+    )
     velocity = eng.rising_velocity(case, inlet.center)
     surface = material.surface_to_volume
     numbers["species"] = species

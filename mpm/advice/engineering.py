@@ -69,11 +69,6 @@ def reynolds(density: float, velocity: float, length: float, viscosity: float) -
     return density * velocity * length / viscosity
 
 
-def effective_diffusivity(material: Material, diffusivity: float, direction: int = 1) -> float:
-    """D_eff = porosity D / tau^2 [m2/s] along x (direction 0) or y (1); `diffusivity` in free gas."""
-    return material.porosity * diffusivity / material.tortuosity_factor[direction]
-
-
 def peclet(velocity: float, length: float, diffusivity: float) -> float:
     """Pe = u l / D: convection over diffusion."""
     return velocity * length / diffusivity
