@@ -9,7 +9,8 @@ import sympy as sp
 
 from mpm.flow.problem import FaceFlow
 from mpm.mesh.strip import Strip
-from mpm.transport.fluxes import FluxAssembler, FluxOperator, bernoulli, exponential_flux
+from mpm.physics.exponentials import bernoulli
+from mpm.transport.fluxes import FluxAssembler, FluxOperator, exponential_flux
 
 from .cases import MPI, strip_case, zone
 

@@ -14,7 +14,7 @@ from mpm.case.case import Case, load_case
 from mpm.cli import main
 from mpm.errors import ConvergenceError
 from mpm.output.results import load_run
-from mpm.physics.kinetics import phi1, phi2
+from mpm.physics.exponentials import phi1, phi2
 from mpm.reactor.reactor import Reactor
 from mpm.reactor.sequence import Replay
 

@@ -25,10 +25,11 @@ from pydantic import (
 
 from mpm.case.chemistry import Chemistry, build_mechanism, check_rates
 from mpm.case.gas import Gas
-from mpm.case.geometry import Flag, Frozen, Geometry, Inlet, Layer, Outlet, Zone
+from mpm.case.geometry import Flag, Geometry, Inlet, Layer, Outlet, Zone
 from mpm.case.kinds import CASE, read_input
 from mpm.case.materials import Material
 from mpm.case.messages import to_input_error
+from mpm.case.model import Frozen
 from mpm.case.motion import Motion
 from mpm.case.names import case_file
 from mpm.case.profile import PRESETS
@@ -55,7 +56,7 @@ __all__ = [
     "Outlet",
     "Output",
     "Time",
-    "Transport",
+    "TransportOptions",
     "Zone",
     "case_schema",
     "load_case",
@@ -85,7 +86,7 @@ class Output(Frozen):
     time.steps_per_cycle; 0: none"""
 
 
-class Transport(Frozen):
+class TransportOptions(Frozen):
     """Options of the species' transport."""
 
     vibrational_dispersion: Flag = False
@@ -113,7 +114,7 @@ class Case(Frozen):
     """end of the simulation and its steps"""
     output: Output = Output()
     """how often results and restart states are written"""
-    transport: Transport = Transport()
+    transport: TransportOptions = TransportOptions()
     """options of the species' transport"""
 
     _mechanism: Mechanism = PrivateAttr()

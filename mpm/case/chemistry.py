@@ -13,9 +13,10 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from mpm.case.model import Frozen, nothing_required
 from mpm.case.schema import DRAFT, finished
 from mpm.physics.elements import parse_formula
 from mpm.physics.equation import ARROW, parse_equation, write_equation
@@ -64,15 +65,8 @@ _RateConstant = Annotated[
 ]
 
 
-def _nothing_required(schema: dict[str, Any]) -> None:
-    """A table in a case may override one key of a mechanism's entry."""
-    schema.pop("required", None)
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", json_schema_extra=_nothing_required, use_attribute_docstrings=True
-    )
+class _Table(Frozen):
+    model_config = ConfigDict(json_schema_extra=nothing_required)
 
 
 class SpeciesTable(_Table):
@@ -132,13 +126,13 @@ class Chemistry(_Table):
     """the reactions: the name of a built-in mechanism, the path of a mechanism file, or inline (all of it in this table)"""
     name: str = worked_out("the mechanism's file name", "", example="alumina")
     """what the mechanism is called in results"""
-    species: dict[str, SpeciesTable] = {}
+    species: dict[str, SpeciesTable] = Field({})
     """gas species, by name; keys given here lie over the mechanism's"""
-    site: dict[str, SiteTable] = {}
+    site: dict[str, SiteTable] = Field({})
     """states of the surface sites, by name; the first is the fresh surface"""
-    film: dict[str, FilmTable] = {}
+    film: dict[str, FilmTable] = Field({})
     """solid products, by name"""
-    reaction: dict[str, ReactionTable] = {}
+    reaction: dict[str, ReactionTable] = Field({})
     """reactions, by name; keys given here lie over the mechanism's, e.g. chemistry.reaction.tma.sticking = 0.1"""
 
 

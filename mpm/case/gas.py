@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, PrivateAttr, WithJsonSchema, model_validator
 
-from mpm.case.geometry import Frozen
+from mpm.case.model import Frozen
 from mpm.physics.diffusion import scaled_diffusivity
 from mpm.physics.gases import CARRIERS, ideal_gas_density, molar_density, symbol
 from mpm.physics.mechanism import Mechanism

@@ -13,7 +13,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     ConfigDict,
     Field,
     PlainSerializer,
@@ -27,6 +26,7 @@ from pydantic import (
 )
 
 from mpm.case.materials import Material
+from mpm.case.model import Frozen, nothing_required, only_name_required
 from mpm.units import (
     ColumnWidth,
     Deadline,
@@ -103,17 +103,6 @@ Windows = Annotated[
 ]
 
 
-class Frozen(BaseModel):
-    """Base of the tables of a case file: values that do not change, keys that are known."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
-
-
-def only_name_required(schema: dict[str, Any]) -> None:
-    """Schema of an entry that may complete one of a shared geometry: there it need only say which."""
-    schema["required"] = ["name"]
-
-
 class Layer(Frozen):
     """A horizontal layer; `material` (a Material; None: gas) is resolved by the case from the name that the file gives."""
 
@@ -171,7 +160,7 @@ class Inlet(_Port):
     """the wall that the inlet is in"""
     velocity: Speed = 0.035
     """speed of the gas through the inlet, at the reactor's temperature and pressure; 0: closed"""
-    mass_fractions: Annotated[dict[str, Fraction], Field(examples=[{"TMA": 2e-4}])] = {}
+    mass_fractions: dict[str, Fraction] = Field({}, examples=[{"TMA": 2e-4}])
     """mass fraction of each precursor in the gas of this inlet while it doses; left out: carrier gas alone (a purge)"""
     start: Instant = 0.0
     """when the dose begins; before that the inlet blows carrier gas"""
@@ -240,15 +229,10 @@ class Zone(Frozen):
     """name of the inlet whose precursor reacts in this zone: its titration is read where solids leave the zone"""
 
 
-def _base_may_give_it(schema: dict[str, Any]) -> None:
-    """With `base`, no key of the geometry is required in the case file itself."""
-    schema.pop("required", None)
-
-
 class Geometry(Frozen):
     """The strip: `length` [m], columns about `cell_width` [m] wide, layers bottom to top, ports and zones."""
 
-    model_config = ConfigDict(json_schema_extra=_base_may_give_it)
+    model_config = ConfigDict(json_schema_extra=nothing_required)
 
     base: str | None = Field(None, exclude=True, examples=["single_zone"])
     """a geometry to start from, the name of a built-in one or the path of a file; keys given here lie over it, list entries by name"""

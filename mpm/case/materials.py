@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchema, model_validator
 
+from mpm.case.model import Frozen, nothing_required
 from mpm.constants import AVOGADRO
 from mpm.units import (
     Conductivity,
@@ -101,17 +102,10 @@ PACKED_SPHERES = 5.0
 """Kozeny's constant of packed spheres (Carman 1937)."""
 
 
-def _nothing_required(schema: dict[str, Any]) -> None:
-    """A table in a case may name a built-in material and change one key of it: editors must accept that."""
-    schema.pop("required", None)
-
-
-class Material(BaseModel):
+class Material(Frozen):
     """A rigid porous solid, homogeneous within its layer. Pairs are (along the reactor, through the layer)."""
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", json_schema_extra=_nothing_required, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(json_schema_extra=nothing_required)
 
     porosity: Porosity
     """share of the layer's volume between the particles, which gas fills"""

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PrivateAttr, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from mpm.case.geometry import Frozen
+from mpm.case.model import Frozen
 from mpm.case.profile import PRESETS, BedProfile, read_profile
 from mpm.constants import GRAVITY
 from mpm.units import Angle, BedSpeed, Frequency, Instant, NonNegative, Velocity, reject

@@ -21,8 +21,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
+from mpm.case.model import Frozen
 from mpm.files import read_text
 from mpm.units import Angle, Frequency, NonNegative, reject
 
@@ -33,10 +34,8 @@ COLUMNS = (*REQUIRED, "u_y_m/s", "contact")
 TURN = 2.0 * math.pi
 
 
-class Conditions(BaseModel):
+class Conditions(Frozen):
     """The vibration that a profile belongs to: `frequency` [Hz], `gamma`, `angle` [rad from the horizontal], kind of `waveform`."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     frequency: Frequency
     gamma: NonNegative

@@ -13,13 +13,14 @@ concentration (a Newton iterate) leaves Q as it is at zero and enters all r_r li
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpm.physics.exponentials import dphi1, dphi2, phi1, phi2
 from mpm.physics.mechanism import GasReaction, SurfaceReaction
 
 if TYPE_CHECKING:
@@ -295,46 +296,3 @@ def _respond(rate: Floats, slopes: Floats, concentration: Floats, g: int, j: int
         slope = factor * np.maximum(own, 0.0)
         slopes[j] += slope
         rate += slope * np.minimum(concentration[j], 0.0)
-
-
-def phi1(x: Floats) -> Floats:
-    """(1 - exp(-x)) / x for x >= 0."""
-    return _series(
-        x,
-        lambda v: -np.expm1(-v) / v,
-        (1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0, -1.0 / 720.0, 1.0 / 5040.0),
-    )
-
-
-def phi2(x: Floats) -> Floats:
-    """(1 - phi1(x)) / x for x >= 0."""
-    return _series(
-        x,
-        lambda v: (1.0 + np.expm1(-v) / v) / v,
-        (1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0, 1.0 / 720.0, -1.0 / 5040.0, 1.0 / 40320.0),
-    )
-
-
-def dphi1(x: Floats) -> Floats:
-    """Derivative of phi1."""
-    return _series(
-        x,
-        lambda v: (np.exp(-v) + np.expm1(-v) / v) / v,
-        (-1.0 / 2.0, 1.0 / 3.0, -1.0 / 8.0, 1.0 / 30.0, -1.0 / 144.0, 1.0 / 840.0, -1.0 / 5760.0),
-    )
-
-
-def dphi2(x: Floats) -> Floats:
-    """Derivative of phi2."""
-    return _series(
-        x,
-        lambda v: -((np.exp(-v) + np.expm1(-v) / v) / v + (1.0 + np.expm1(-v) / v) / v) / v,
-        (-1.0 / 6.0, 1.0 / 12.0, -1.0 / 40.0, 1.0 / 180.0, -1.0 / 1008.0, 1.0 / 6720.0, -1.0 / 51840.0),
-    )
-
-
-def _series(x: Floats, closed: Callable[[Floats], Floats], coefficients: tuple[float, ...]) -> Floats:
-    """`closed` away from 0, its Taylor polynomial where cancellation would spoil it; what that leaves out is below rounding."""
-    small = x < 0.02
-    polynomial = np.polynomial.polynomial.polyval(x, coefficients)
-    return np.where(small, polynomial, closed(np.where(small, 1.0, x)))

@@ -19,20 +19,13 @@ from numpy.typing import NDArray
 from mpm.flow.problem import FaceFlow, inlet_share
 from mpm.mesh.strip import Strip
 from mpm.parallel import any_rank
+from mpm.physics.exponentials import bernoulli
 
 if TYPE_CHECKING:
     from mpm.case.case import Case, Inlet, Outlet
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
-def bernoulli(z: Floats) -> Floats:
-    """B(z) = z / (exp z - 1), with its series near 0 and no overflow for any finite z."""
-    z = np.asarray(z, dtype=float)
-    small = np.abs(z) < 1e-3
-    near, far = np.where(small, z, 0.0), np.where(small, 1.0, np.minimum(z, 700.0))
-    return np.where(small, 1.0 - near / 2.0 + near * near / 12.0, far / np.expm1(far))
 
 
 def exponential_flux(velocity: Floats, conductance: Floats) -> tuple[Floats, Floats]:
