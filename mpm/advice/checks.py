@@ -32,6 +32,7 @@ from mpm.physics.fluidisation import (
 from mpm.physics.mechanism import mole_fractions
 from mpm.physics.porous import effective_diffusivity
 from mpm.physics.saturation import coverage_met, slowest_turnover, uptake
+from mpm.plain import plain
 
 SMEARED = 0.1
 """Numerical over molecular diffusion along x that deserves a warning: 0.44 raised the coverage before the inlet by 0.008 in the zone, 0.19
@@ -95,17 +96,8 @@ def check_case(case: Case) -> dict[str, Any]:
     report["notes"] = notes(case)
     report["without_effect"] = idle_keys(case)
     report["warnings"] = warnings(case, report)  # before anything is dropped that they speak of
-    return {key: _finite(entry) for key, entry in report.items()}
-
-
-def _finite(value: Any) -> Any:
-    """Drop None and numbers that are not finite."""
-    if isinstance(value, dict):
-        kept = {key: _finite(entry) for key, entry in value.items()}
-        return {key: entry for key, entry in kept.items() if entry is not None}
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    found: dict[str, Any] = plain(report)
+    return found
 
 
 def _strip(case: Case) -> dict[str, Any]:

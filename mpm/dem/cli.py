@@ -1,6 +1,5 @@
 """`mpm dem POWDER.toml` and `mpm dem waveform DATA.csv`, a sub-command of `mpm` and also a program of its own."""
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -14,6 +13,7 @@ from mpm.case.settings import parse_settings
 from mpm.errors import InputError
 from mpm.help import HELP_NAMES, App, Verbs
 from mpm.launcher import rank
+from mpm.plain import json_text
 from mpm.screen import screen
 
 from .accelerometer import fit_record, read_record, resample, spectrum
@@ -139,7 +139,7 @@ def waveform(
 
     from mpm.files import write_atomically
 
-    from .report import draw_waveform, finite
+    from .report import draw_waveform
 
     rows = {"horizontal": (fitted.horizontal, along), "vertical": (fitted.vertical, vertical)}
     report: dict[str, Any] = {
@@ -166,9 +166,7 @@ def waveform(
             f'amplitude = "{h.amplitude!r} m/s^2"\nfrequency = "{h.frequency!r} Hz"\nphase = "{h.phase!r} rad"'
             for h in terms
         ]
-    write_atomically(
-        directory / "waveform.json", json.dumps(finite(report), indent=2, allow_nan=False) + "\n"
-    )
+    write_atomically(directory / "waveform.json", json_text(report, "waveform.json"))
     write_atomically(directory / "waveform.toml", "\n".join(toml) + "\n")
     unshifted = HarmonicWaveform(along.harmonics, vertical.harmonics, fitted.frequency)
     spectra = [spectrum(*resample(record.t, row)) for row in record.acceleration]

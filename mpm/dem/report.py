@@ -1,7 +1,5 @@
 """Files and pictures of a finished DEM run: profile.csv, summary.json, tables of the maps, plots."""
 
-import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ from matplotlib.figure import Figure
 from mpm.errors import printable
 from mpm.files import write_atomically, write_picture
 from mpm.labels import literal
+from mpm.plain import json_text
 
 from .analysis import Results
 from .box import BoxSpec, Particles
@@ -22,23 +21,9 @@ from .waveform import HarmonicWaveform, Waveform
 BASE, BED, FIT = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito: stay apart for colour-blind readers
 
 
-def finite(value: Any) -> Any:
-    """A copy for JSON: numpy scalars as floats, None and numbers that are not finite left out."""
-    if isinstance(value, Mapping):
-        cleaned = {k: finite(v) for k, v in value.items()}
-        return {k: v for k, v in cleaned.items() if v is not None and v != {}}
-    if isinstance(value, list | tuple):
-        return [v for v in (finite(item) for item in value) if v is not None]
-    if isinstance(value, float | np.floating):
-        return float(value) if math.isfinite(value) else None
-    return int(value) if isinstance(value, np.integer) else value
-
-
 def write_summary(directory: Path, summary: Mapping[str, Any]) -> None:
     """summary.json: SI, finite numbers only; what could not be computed is absent."""
-    write_atomically(
-        directory / "summary.json", json.dumps(finite(summary), indent=2, allow_nan=False) + "\n"
-    )
+    write_atomically(directory / "summary.json", json_text(summary, "summary.json"))
 
 
 def write_tables(directory: Path, case: DemCase, results: Results, waveform: Waveform) -> None:

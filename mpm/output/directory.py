@@ -39,6 +39,7 @@ from mpm.files import flush, load_arrays, load_json, lock, write_atomically
 from mpm.output import vtu
 from mpm.output.history import History
 from mpm.output.series import Series, check_finite
+from mpm.plain import json_text, plain
 
 if TYPE_CHECKING:
     from mpm.mesh.grid import Grid
@@ -180,8 +181,7 @@ class RunDirectory:
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write `summary.json`; what could not be computed (None, not finite) is dropped."""
-        text = json.dumps(plain(summary, "summary.json", drop=True), indent=2, allow_nan=False)
-        write_atomically(self.path / "summary.json", text + "\n", sync=True)
+        write_atomically(self.path / "summary.json", json_text(summary, "summary.json", _left_out), sync=True)
 
     def write_flux(self, profiles: Mapping[str, NDArray[np.float64]]) -> None:
         """Write `flux.csv`, columns of equal length (`mpm.flow.numbers.flux_profiles`)."""
@@ -210,7 +210,7 @@ class RunDirectory:
             if path.exists():
                 flush(path)
         buffer = io.BytesIO()
-        text = json.dumps(plain(meta, "checkpoint.npz"), allow_nan=False)
+        text = json.dumps(plain(meta, "checkpoint.npz", _refused), allow_nan=False)
         stored: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items()}
         stored[META] = np.frombuffer(text.encode(), dtype=np.uint8)
         np.savez(buffer, **stored)
@@ -245,28 +245,9 @@ class RunDirectory:
             path.unlink()
 
 
-def plain(value: Any, where: str, drop: bool = False) -> Any:
-    """`value` in JSON's own types: numpy numbers and arrays converted, None dropped.
+def _left_out(where: str, number: float) -> None:
+    log.warning("%s is %g, left out", where, number)
 
-    What is not finite is dropped too (a list with it), or without `drop` an MpmError.
-    """
-    if isinstance(value, Mapping):
-        items = {str(key): plain(item, f"{where}: {key}", drop) for key, item in value.items()}
-        return {key: item for key, item in items.items() if item is not None}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist(), where, drop)
-    if isinstance(value, list | tuple):
-        found = [plain(item, f"{where}[{index}]", drop) for index, item in enumerate(value)]
-        return None if None in found else found
-    if isinstance(value, np.generic):
-        value = value.item()
-    if value is None:
-        return None
-    if isinstance(value, float) and not math.isfinite(value):
-        if not drop:
-            raise MpmError(f"{where} is {value}")
-        log.warning("%s is %g, left out", where, value)
-        return None
-    if not isinstance(value, bool | int | float | str):
-        raise MpmError(f"{where}: {type(value).__name__} is not a number, text, list or table")
-    return value
+
+def _refused(where: str, number: float) -> None:
+    raise MpmError(f"{where} is {number}")
