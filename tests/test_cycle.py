@@ -12,20 +12,15 @@ import pytest
 from mpm.case.case import Case, load_case
 from mpm.reactor.reactor import Reactor, Result
 
+from .cases import COARSE
+
 ROOT = Path(__file__).parents[1]
-COARSE = {
-    "geometry.cell_width": "2.33 mm",
-    "geometry.layer.plenum.cells": 4,
-    "geometry.layer.frit.cells": 3,
-    "geometry.layer.bed.cells": 4,
-    "geometry.layer.headspace.cells": 8,
-    "time.step": "50 ms",
-}
+STEPS = {**COARSE, "time.step": "50 ms"}
 TMA, WATER = "geometry.inlet.tma.mass_fractions.TMA", "geometry.inlet.water.mass_fractions.H2O"
 
 
 def run(**changes: Any) -> Result:
-    return Reactor(load_case("single_cycle", {**COARSE, "output.every": "0.5 s", **changes})).run()
+    return Reactor(load_case("single_cycle", {**STEPS, "output.every": "0.5 s", **changes})).run()
 
 
 def test_stoichiometric_doses_and_a_delay_keep_cvd_low() -> None:
@@ -65,7 +60,7 @@ def test_stoichiometric_doses_and_a_delay_keep_cvd_low() -> None:
 
 def coarse_file(folder: Path, name: str) -> Path:
     path = folder / f"{name}.toml"
-    case = load_case(name, {**COARSE, "time.end": "2 s", "output.every": "1 s"})
+    case = load_case(name, {**STEPS, "time.end": "2 s", "output.every": "1 s"})
     path.write_text(case.to_toml(), encoding="utf-8")
     return path
 

@@ -143,7 +143,7 @@ def test_resolved_run_refuses_the_option() -> None:
         zone({**ON, "fidelity": "resolved"})
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 def test_ranks_agree_on_dispersion() -> None:
     """Fails when the coefficients depend on the number of ranks."""
     case = zone({**SHORT, **ON, "fidelity": "steady"}, TINY)

@@ -10,7 +10,6 @@ from mpm.physics.mechanism import Mechanism, Site, Species, SurfaceReaction
 from .cases import CASES, rate
 
 T = 473.0
-RNG = np.random.default_rng(11)
 N = 40
 SURFACE, SITES = np.full(N, 58000.0), np.full(N, 6.92e-8)
 
@@ -58,11 +57,17 @@ def ring() -> Mechanism:
     return Mechanism("ring", gases, tuple(Site(s, {}) for s in "xyz"), (), reactions, ())
 
 
-def random_state(species: int, sites: int) -> tuple[np.ndarray, np.ndarray]:
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """One for each test: what a test draws does not depend on those before it."""
+    return np.random.default_rng(11)
+
+
+def random_state(rng: np.random.Generator, species: int, sites: int) -> tuple[np.ndarray, np.ndarray]:
     """Concentrations over nine decades, some of them zero, and coverages that sum to one."""
-    concentration = 10.0 ** RNG.uniform(-9.0, 0.0, (species, N))
+    concentration = 10.0 ** rng.uniform(-9.0, 0.0, (species, N))
     concentration[:, :4] = 0.0
-    theta = RNG.dirichlet(np.full(sites, 0.4), N).T
+    theta = rng.dirichlet(np.full(sites, 0.4), N).T
     return concentration, np.ascontiguousarray(theta / theta.sum(axis=0))
 
 
@@ -71,10 +76,12 @@ def surface(mechanism: Mechanism, coupled: tuple[str, ...]) -> SurfaceKinetics:
 
 
 @pytest.mark.parametrize("dt", [1e-6, 1e-2, 1e3])
-def test_three_sites_agree_with_the_closed_form_of_two(alumina: Mechanism, dt: float) -> None:
+def test_three_sites_agree_with_the_closed_form_of_two(
+    rng: np.random.Generator, alumina: Mechanism, dt: float
+) -> None:
     """Fails when the general solver or the closed form for two kinds of sites has a wrong coefficient, rate or slope."""
     two, three = surface(alumina, ("TMA", "H2O")), surface(with_third_site(alumina), ("TMA", "H2O"))
-    concentration, theta = random_state(2, 2)
+    concentration, theta = random_state(rng, 2, 2)
     wide = np.vstack([theta, np.zeros(N)])
     np.testing.assert_allclose(
         three.coverage(concentration, wide, dt)[:2], two.coverage(concentration, theta, dt), atol=1e-13
@@ -90,12 +97,14 @@ def test_three_sites_agree_with_the_closed_form_of_two(alumina: Mechanism, dt: f
 
 @pytest.mark.parametrize("kind", ["alumina", "ring"])
 @pytest.mark.parametrize("dt", [1e-5, 1e-3, 1e-1])
-def test_slopes_are_the_derivatives_of_the_rates(alumina: Mechanism, kind: str, dt: float) -> None:
+def test_slopes_are_the_derivatives_of_the_rates(
+    rng: np.random.Generator, alumina: Mechanism, kind: str, dt: float
+) -> None:
     """Fails when the Jacobian of the surface rates is not that of the rates (Newton would crawl or stall)."""
     mechanism, coupled = (alumina, ("TMA", "H2O")) if kind == "alumina" else (ring(), ("A", "B", "C"))
     kinetics = surface(mechanism, coupled)
-    _, theta = random_state(len(coupled), len(mechanism.sites))
-    concentration = RNG.uniform(0.2, 1.0, (len(coupled), N)) * 1e-3
+    _, theta = random_state(rng, len(coupled), len(mechanism.sites))
+    concentration = rng.uniform(0.2, 1.0, (len(coupled), N)) * 1e-3
     values, slopes = kinetics.rates(concentration, theta, dt)
     for j in range(len(coupled)):
         h = 1e-6 * concentration[j]
@@ -108,11 +117,13 @@ def test_slopes_are_the_derivatives_of_the_rates(alumina: Mechanism, kind: str, 
 
 @pytest.mark.parametrize("kind", ["alumina", "ring"])
 @pytest.mark.parametrize("dt", [1e-6, 1e-2, 1e2, 1e8])
-def test_coverage_stays_between_zero_and_one(alumina: Mechanism, kind: str, dt: float) -> None:
+def test_coverage_stays_between_zero_and_one(
+    rng: np.random.Generator, alumina: Mechanism, kind: str, dt: float
+) -> None:
     """Fails when any step, however long, takes a coverage out of [0, 1] or loses sites; rates must account for the change exactly."""
     mechanism, coupled = (alumina, ("TMA", "H2O")) if kind == "alumina" else (ring(), ("A", "B", "C"))
     kinetics = surface(mechanism, coupled)
-    concentration, theta = random_state(len(coupled), len(mechanism.sites))
+    concentration, theta = random_state(rng, len(coupled), len(mechanism.sites))
     theta[:, 10:20] = np.eye(len(theta))[:, [0]]  # fresh
     new = kinetics.coverage(concentration, theta, dt)
     assert new.min() >= 0.0 and new.max() <= 1.0
@@ -153,12 +164,12 @@ def test_coverage_under_constant_gas_decays_exponentially(alumina: Mechanism) ->
 
 @pytest.mark.parametrize("kind", ["alumina", "ring"])
 @pytest.mark.parametrize("time", [1e-6, 1e-3, 1.0])
-def test_conveyed_solids(alumina: Mechanism, kind: str, time: float) -> None:
+def test_conveyed_solids(rng: np.random.Generator, alumina: Mechanism, kind: str, time: float) -> None:
     """Fails when the coverage that leaves a cell and the mean rates in it do not balance, or any of their derivatives is wrong."""
     mechanism, coupled = (alumina, ("TMA", "H2O")) if kind == "alumina" else (ring(), ("A", "B", "C"))
     kinetics = surface(mechanism, coupled)
-    _, theta = random_state(len(coupled), len(mechanism.sites))
-    concentration = RNG.uniform(0.2, 1.0, (len(coupled), N)) * 1e-3
+    _, theta = random_state(rng, len(coupled), len(mechanism.sites))
+    concentration = rng.uniform(0.2, 1.0, (len(coupled), N)) * 1e-3
     passed = kinetics.conveyed(concentration, theta, time)
     turned = kinetics.nu_site.T @ passed.rates * time / SITES
     np.testing.assert_allclose(passed.out - theta, turned, atol=1e-12 * max(1.0, np.abs(turned).max()))

@@ -40,6 +40,7 @@ CASES: dict[str, Case] = {
 }  # fmt: skip
 
 
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("name", CASES)
 def test_ranks_agree(name: str, tmp_path: Path) -> None:
     """Fails when any physical number, field or history entry depends on the number of ranks by more than 1e-8.

@@ -85,7 +85,7 @@ def test_resumed_run_equals_the_uninterrupted_one(mode: str, tmp_path: Path) -> 
             np.testing.assert_allclose(resumed.history[name], values, rtol=1e-9, atol=1e-15, err_msg=name)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("mode", ["resolved", "impulsive", "both precursors"])
 def test_restart_state_is_complete_on_several_ranks(mode: str, tmp_path: Path) -> None:
     """Fails when a run that goes on from a state differs by more than 1e-12 from the run that wrote the state in passing.
@@ -115,7 +115,7 @@ def test_restart_state_is_complete_on_several_ranks(mode: str, tmp_path: Path) -
     assert_same_state(whole, resumed, 1e-12)
 
 
-@pytest.mark.parallel
+@pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize("mode", ["resolved", "both precursors"])
 def test_restart_on_another_number_of_ranks(mode: str, tmp_path: Path) -> None:
     """Fails when a restart state depends on the ranks that wrote it: one rank to all and all to one must agree with one to 1e-8."""
