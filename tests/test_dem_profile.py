@@ -144,7 +144,10 @@ def test_drag_carries_the_bed_at_minimum_fluidisation(name):
     """At Ergun's velocity for the voidage, the drag on a particle of a uniform bed is its weight."""
     p = POWDERS[name]
     air, mu = 1.206, 18e-6
-    velocity = minimum_fluidisation_velocity(p.diameter, p.sphericity, p.density, 0.45, mu, air, *p.ergun)
+    velocity = minimum_fluidisation_velocity(
+        diameter=p.diameter, sphericity=p.sphericity, density_solid=p.density, porosity=0.45,
+        viscosity=mu, density_gas=air, ergun=p.ergun,
+    )  # fmt: skip
     gas = GasDrag(p, mu, air, velocity)
     edges = gas.edges(20 * p.diameter)
     height = np.full(3, 10 * p.diameter)

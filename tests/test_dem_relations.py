@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from mpm.constants import GRAVITY
 from mpm.dem.bed import bond_numbers
 from mpm.dem.case import load_case
 from mpm.dem.cohesion import largest_force, reduced_hamaker, rumpf_force
@@ -14,8 +15,9 @@ from mpm.dem.simulate import build
 from mpm.errors import InputError
 from mpm.physics import conveying, fluidisation
 from mpm.physics.gases import ideal_gas_density
+from mpm.physics.porous import kozeny_carman
 
-AIR = ideal_gas_density(101325.0, 29e-3, 293.15)
+AIR = ideal_gas_density(pressure=101325.0, molar_mass=29e-3, temperature=293.15)
 MU = 18e-6
 
 
@@ -30,27 +32,22 @@ def test_conveying_limits():
     assert conveying.efficiency(-0.5, 2.0) == 0.25
 
 
-def test_slip_onset():
-    """mu 0.4 at 60 deg: no slip below Gamma 0.41; mu above cot b never slips backwards."""
-    forward, backward = conveying.slip_onset(0.4, math.radians(60))
-    assert forward == pytest.approx(0.4 / (1 / math.sqrt(3) + 0.4)) and backward > forward
-    assert conveying.slip_onset(0.6, math.radians(60))[1] == math.inf
-
-
 @pytest.mark.parametrize(
-    ("porosity", "surface", "permeability", "low", "high"),
+    ("porosity", "surface", "permeability", "constants"),
     [
-        (0.46, 0.073e6, 4.25e-12, 4.098, 4.643),
-        (0.37, 0.062e6, 2.76e-12, 4.502, 5.262),
-        (0.68, 0.062e6, 3.66e-12, 21.001, 23.670),
-        (0.40, 0.007e6, 17.93e-12, 61.090, 94.950),
+        (0.46, 0.073e6, 4.25e-12, (4.098, 4.643)),
+        (0.37, 0.062e6, 2.76e-12, (4.502, 5.262)),
+        (0.68, 0.062e6, 3.66e-12, (21.001, 23.670)),
+        (0.40, 0.007e6, 17.93e-12, (61.090, 94.950)),
     ],
 )
-def test_kozeny_constants_of_table_5_4(porosity, surface, permeability, low, high):
-    """The constant from porosity, surface and permeability lies in the interval that rounding allows."""
-    constant = fluidisation.kozeny_carman_constant(porosity, surface, permeability)
-    assert low <= constant <= high
-    assert fluidisation.kozeny_carman_permeability(porosity, surface, constant) == pytest.approx(permeability)
+def test_kozeny_constants_of_table_5_4(porosity, surface, permeability, constants):
+    """Fails when the permeability of table 5.4 does not lie between those of the constants that the rounding of its numbers allows."""
+    high, low = (
+        kozeny_carman(porosity=porosity, surface_to_volume=surface, constant=constant)
+        for constant in constants
+    )
+    assert low <= permeability <= high
 
 
 @pytest.mark.parametrize(
@@ -63,52 +60,68 @@ def test_kozeny_constants_of_table_5_4(porosity, surface, permeability, low, hig
     ],
 )
 def test_minimum_fluidisation_against_the_reference(name, ergun46, wen_yu):
-    """Reference table umf.csv at a voidage of 0.46 [cm/s]; Gidaspow's dense branch is Ergun's."""
+    """Reference table umf.csv at a voidage of 0.46 [cm/s]; Gidaspow's drag carries the bed at the same velocity."""
     p = POWDERS[name]
-    ergun = fluidisation.minimum_fluidisation_velocity(
-        p.diameter, p.sphericity, p.density, 0.46, MU, AIR, *p.ergun
+
+    def ergun(porosity):
+        return fluidisation.minimum_fluidisation_velocity(
+            diameter=p.diameter, sphericity=p.sphericity, density_solid=p.density, porosity=porosity,
+            viscosity=MU, density_gas=AIR, ergun=p.ergun,
+        )  # fmt: skip
+
+    velocity = ergun(0.46)
+    assert 100 * velocity == pytest.approx(ergun46, rel=1e-3)
+    beta = fluidisation.gidaspow_beta(
+        0.46,
+        velocity / 0.46,
+        diameter=p.diameter,
+        sphericity=p.sphericity,
+        viscosity=MU,
+        density=AIR,
+        ergun=p.ergun,
     )
-    gidaspow = fluidisation.minimum_fluidisation_velocity(
-        p.diameter, p.sphericity, p.density, 0.46, MU, AIR, *p.ergun, law="gidaspow"
+    weight = (1 - 0.46) * (p.density - AIR) * GRAVITY
+    assert float(beta) * velocity / 0.46**2 == pytest.approx(weight, rel=1e-9)
+    other = fluidisation.wen_yu_minimum_fluidisation(
+        diameter=p.diameter, density_solid=p.density, viscosity=MU, density_gas=AIR
     )
-    assert 100 * ergun == pytest.approx(ergun46, rel=1e-3)
-    assert gidaspow == pytest.approx(ergun, rel=1e-9)
-    assert 100 * fluidisation.wen_yu_minimum_fluidisation(p.diameter, p.density, MU, AIR) == pytest.approx(
-        wen_yu, rel=1e-3
-    )
+    assert 100 * other == pytest.approx(wen_yu, rel=1e-3)
     # A loose bed (0.40-0.56) reaches the measured value for every powder.
-    speeds = [
-        fluidisation.minimum_fluidisation_velocity(p.diameter, p.sphericity, p.density, e, MU, AIR, *p.ergun)
-        for e in (0.40, 0.56)
-    ]
-    assert p.measured_umf is not None and speeds[0] < p.measured_umf < speeds[1]
+    assert p.measured_umf is not None and ergun(0.40) < p.measured_umf < ergun(0.56)
 
 
 def test_drag_is_continuous_in_the_slip_and_finite_at_rest():
     """Fails if the dilute branch divides by a slip of zero or has another limit there."""
-    still = fluidisation.gidaspow_beta(np.array([0.5, 0.9, 1.0]), np.zeros(3), 50e-6, 0.8, MU, AIR)
-    slow = fluidisation.gidaspow_beta(np.array([0.5, 0.9, 1.0]), np.full(3, 1e-9), 50e-6, 0.8, MU, AIR)
+    still, slow = (
+        fluidisation.gidaspow_beta(
+            np.array([0.5, 0.9, 1.0]),
+            np.full(3, slip),
+            diameter=50e-6,
+            sphericity=0.8,
+            viscosity=MU,
+            density=AIR,
+        )
+        for slip in (0.0, 1e-9)
+    )
     assert still == pytest.approx(slow, rel=1e-3) and still[2] == 0.0
     assert np.isfinite(still).all()
 
 
 def test_granular_bond_numbers_of_the_seed():
     """23.8 (24, table 2.1), 19 and 76 (table 3.3); and 307 with the Hamaker constant of section 2.4.4."""
-    for name, pair, wall in (("GL50", 23.8, None), ("GL56", 19.0, 76.0)):
-        p = POWDERS[name]
-        force = largest_force(p.hamaker, p.diameter / 4, p.asperity)
-        assert fluidisation.granular_bond_number(force, p.diameter, p.density) == pytest.approx(
-            pair, rel=5e-3
+
+    def bond_number(powder, *force):
+        return fluidisation.granular_bond_number(
+            cohesion=largest_force(*force), diameter=powder.diameter, density=powder.density
         )
-        if wall:
-            force = largest_force(p.wall_hamaker, p.diameter / 2, p.asperity)
-            assert fluidisation.granular_bond_number(force, p.diameter, p.density) == pytest.approx(
-                wall, rel=5e-3
-            )
-    p = POWDERS["GL50"]
-    assert fluidisation.granular_bond_number(
-        largest_force(4e-19, 12.5e-6, 1e-9), 50e-6, 2500
-    ) == pytest.approx(307, rel=5e-3)
+
+    gl50, gl56 = POWDERS["GL50"], POWDERS["GL56"]
+    for p, expected in ((gl50, 23.8), (gl56, 19.0)):
+        assert bond_number(p, p.hamaker, p.diameter / 4, p.asperity) == pytest.approx(expected, rel=5e-3)
+    wall = bond_number(gl56, gl56.wall_hamaker, gl56.diameter / 2, gl56.asperity)
+    assert wall == pytest.approx(76.0, rel=5e-3)
+    assert (gl50.diameter, gl50.density) == (50e-6, 2500)
+    assert bond_number(gl50, 4e-19, 12.5e-6, 1e-9) == pytest.approx(307, rel=5e-3)
 
 
 def test_rumpf_force_is_held_inside_and_ends_outside():
@@ -118,22 +131,12 @@ def test_rumpf_force_is_held_inside_and_ends_outside():
     assert reduced_hamaker(3.1e-20, 25.0, 2500.0) == pytest.approx(3.1e-21)
 
 
-def test_single_particle_drag_estimates():
-    """Supplement A: at 2 cm/s drag is far below cohesion; 25 um mean free path of N2 at 2 Torr."""
-    slip, d = 0.02, 50e-6
-    reynolds = AIR * slip * d / MU
-    assert reynolds < 0.1
-    stokes = fluidisation.drag_force(fluidisation.stokes_drag_coefficient(reynolds), AIR, slip, d)
-    assert stokes == pytest.approx(3 * math.pi * MU * d * slip, rel=1e-12)
-    knudsen = fluidisation.drag_force(fluidisation.knudsen_drag_coefficient(reynolds, 1.0), AIR, slip, d)
-    crowd = fluidisation.drag_force(fluidisation.ergun_drag_coefficient(reynolds), AIR, slip, d)
-    cohesion = largest_force(3.1e-20, 12.5e-6, 1e-9)
-    assert knudsen == pytest.approx(stokes / 3.976, rel=0.03)
-    assert crowd / stokes == pytest.approx(15.0, rel=0.01)
-    assert knudsen < stokes < crowd < cohesion
-    assert fluidisation.mean_free_path(17.6e-6, 2 * 133.32, 293.15, 28.01e-3) == pytest.approx(
-        25e-6, rel=0.05
+def test_mean_free_path_of_the_seed():
+    """About 25 um in N2 at 2 Torr (supplement A)."""
+    path = fluidisation.mean_free_path(
+        viscosity=17.6e-6, pressure=2 * 133.32, temperature=293.15, molar_mass=28.01e-3
     )
+    assert path == pytest.approx(25e-6, rel=0.05)
 
 
 def test_collision_time_and_damping():

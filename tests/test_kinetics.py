@@ -1,5 +1,7 @@
 """Surface and gas reaction rates over a step, without a mesh: closed forms, derivatives, bounds, balances."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,14 +23,7 @@ def alumina() -> Mechanism:
 
 def with_third_site(mechanism: Mechanism) -> Mechanism:
     """The same reactions among three states, the third of which nothing makes: takes the general solver."""
-    return Mechanism(
-        mechanism.name,
-        mechanism.species,
-        (*mechanism.sites, Site("inert", {})),
-        mechanism.films,
-        mechanism.surface_reactions,
-        mechanism.gas_reactions,
-    )
+    return replace(mechanism, sites=(*mechanism.sites, Site("inert", {})))
 
 
 def ring() -> Mechanism:
@@ -54,7 +49,10 @@ def ring() -> Mechanism:
         reaction("B", "y", "z", 2.0, 1.3),
         reaction("C", "z", "x", 1.0, 0.2),
     )
-    return Mechanism("ring", gases, tuple(Site(s, {}) for s in "xyz"), (), reactions, ())
+    sites = tuple(Site(s, {}) for s in "xyz")
+    return Mechanism(
+        name="ring", species=gases, sites=sites, films=(), surface_reactions=reactions, gas_reactions=()
+    )
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 
 from mpm.advice.checks import check_case
 from mpm.case.case import Case
-from mpm.physics.mechanism import Mechanism, Species, SurfaceReaction
+from mpm.physics.mechanism import Mechanism, Site, Species, SurfaceReaction
 from mpm.physics.saturation import coverage_met, molecules_per_site, saturate, slowest_turnover, uptake
 
 from .cases import COARSE, run, zone
@@ -17,19 +17,30 @@ def reaction(
 ) -> SurfaceReaction:
     """`molecules` of a gas turn the sites `start` into `stops`."""
     sites = {start: -sum(stops.values()), **stops}
-    return SurfaceReaction(f"{gas}-{start}", "", k, 0.0, 0.0, 1.0, gas, start, {gas: -molecules}, sites)
+    return SurfaceReaction(
+        key=f"{gas}-{start}",
+        equation="",
+        A=k,
+        b=0.0,
+        Ea=0.0,
+        reference_temperature=1.0,
+        gas=gas,
+        site=start,
+        nu_gas={gas: -molecules},
+        nu_site=sites,
+    )
 
 
 def mechanism(*reactions: SurfaceReaction) -> Mechanism:
     sites = dict.fromkeys(name for r in reactions for name in r.nu_site)
     gases = dict.fromkeys(r.gas for r in reactions)
     return Mechanism(
-        "test",
-        tuple(Species(name, 0.03, {}) for name in gases),
-        tuple(Species(name, 0.03, {}) for name in sites),  # type: ignore[arg-type]  # only names are read
-        (),
-        reactions,
-        (),
+        name="test",
+        species=tuple(Species(name, 0.03, {}) for name in gases),
+        sites=tuple(Site(name, {}) for name in sites),
+        films=(),
+        surface_reactions=reactions,
+        gas_reactions=(),
     )
 
 

@@ -79,7 +79,7 @@ def gas_caveats(case: Case) -> list[str]:
     """Typed properties of the gas that its temperature, pressure and carrier contradict, and diffusivities in a gas that is not known."""
     gas, found = case.gas, []
     state = f"{gas.carrier} at {gas.temperature:g} K and {gas.pressure:.6g} Pa"
-    ideal = ideal_gas_density(gas.pressure, gas.molar_mass, gas.temperature)
+    ideal = ideal_gas_density(pressure=gas.pressure, molar_mass=gas.molar_mass, temperature=gas.temperature)
     if abs(gas.density - ideal) > SAME_DENSITY * ideal:
         found.append(
             f"gas.density is {gas.density:.4g} kg/m3, {state} has {ideal:.4g} kg/m3: feeds are counted with the latter"
@@ -92,7 +92,13 @@ def gas_caveats(case: Case) -> list[str]:
     told: dict[str, list[str]] = {}  # species of whom the same is to be said
     for species in case.mechanism.species:
         value = gas.diffusivity[species.name]
-        scaled = scaled_diffusivity(species, gas.carrier, gas.molar_mass, gas.temperature, gas.pressure)
+        scaled = scaled_diffusivity(
+            species,
+            gas.carrier,
+            molar_mass=gas.molar_mass,
+            temperature=gas.temperature,
+            pressure=gas.pressure,
+        )
         if species.name not in gas.scaled and value > 0.0 and _apart(value, scaled):
             text = (
                 f"is {value:.3g} m2/s, in {state} it would be about {scaled:.3g} m2/s: left out, it is scaled"

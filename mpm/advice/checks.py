@@ -115,7 +115,9 @@ def _strip(case: Case) -> dict[str, Any]:
 
 def _free_path(case: Case) -> float:
     gas = case.gas
-    return mean_free_path(gas.viscosity, gas.pressure, gas.temperature, gas.molar_mass)
+    return mean_free_path(
+        viscosity=gas.viscosity, pressure=gas.pressure, temperature=gas.temperature, molar_mass=gas.molar_mass
+    )
 
 
 def _pores(case: Case, material: Material) -> dict[str, float]:
@@ -200,16 +202,19 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
         numbers["Re_particle"] = eng.reynolds(gas.density, rising, material.particle_diameter, gas.viscosity)
         if material.density is not None and material.density > gas.density:
             ergun = minimum_fluidisation_velocity(
-                material.particle_diameter,
-                material.sphericity,
-                material.density,
-                material.porosity,
-                gas.viscosity,
-                gas.density,
+                diameter=material.particle_diameter,
+                sphericity=material.sphericity,
+                density_solid=material.density,
+                porosity=material.porosity,
+                viscosity=gas.viscosity,
+                density_gas=gas.density,
             )
             numbers["minimum_fluidisation_ergun"] = ergun
             numbers["minimum_fluidisation_wen_yu"] = wen_yu_minimum_fluidisation(
-                material.particle_diameter, material.density, gas.viscosity, gas.density
+                diameter=material.particle_diameter,
+                density_solid=material.density,
+                viscosity=gas.viscosity,
+                density_gas=gas.density,
             )
             numbers["gas_over_minimum_fluidisation"] = rising / ergun
     return numbers

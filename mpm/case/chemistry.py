@@ -205,14 +205,13 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
             raise reject(
                 **{**context, "key": f"chemistry.reaction.{key}.{context.get('key', 'equation')}"}
             ) from None
-    name = chemistry.name or chemistry.mechanism
     return Mechanism(
-        name,
-        tuple(species.values()),
-        tuple(sites.values()),
-        tuple(films.values()),
-        tuple(surface),
-        tuple(gas),
+        name=chemistry.name or chemistry.mechanism,
+        species=tuple(species.values()),
+        sites=tuple(sites.values()),
+        films=tuple(films.values()),
+        surface_reactions=tuple(surface),
+        gas_reactions=tuple(gas),
     )
 
 
@@ -223,14 +222,13 @@ def check_rates(mechanism: Mechanism, temperature: float) -> None:
         key = f"chemistry.reaction.{reaction.key}"
         if isinstance(reaction, SurfaceReaction):
             constant = reaction.rate_constant(temperature, mechanism.get(reaction.gas).molar_mass)
-            if reaction.sticking is not None:
-                share = float(reaction.sticking_coefficient(temperature))
-                if not share <= 1.0:
-                    raise reject(
-                        f"sticking, b and Ea that make a sticking coefficient of {share:.3g} at {temperature:g} K",
-                        "one of at most 1: of the collisions no more than all can react",
-                        key=f"{key}.sticking",
-                    )
+            share = reaction.sticking_coefficient(temperature)
+            if share is not None and not float(share) <= 1.0:
+                raise reject(
+                    f"sticking, b and Ea that make a sticking coefficient of {float(share):.3g} at {temperature:g} K",
+                    "one of at most 1: of the collisions no more than all can react",
+                    key=f"{key}.sticking",
+                )
         else:
             constant = reaction.rate_constant(temperature)
         if not float(constant) <= LARGEST:
@@ -320,18 +318,18 @@ def _surface_reaction(
             key="b",
         )
     return SurfaceReaction(
-        key,
-        write_equation(left, right),
-        A,
-        table.b,
-        table.Ea,
-        table.reference_temperature,
-        gases[0],
-        states[0],
-        {name: value for name, value in net.items() if name in species and value},
-        {name: value for name, value in net.items() if name in sites and value},
-        {name: value for name, value in net.items() if name in films and value},
-        table.sticking,
+        key=key,
+        equation=write_equation(left, right),
+        A=A,
+        b=table.b,
+        Ea=table.Ea,
+        reference_temperature=table.reference_temperature,
+        gas=gases[0],
+        site=states[0],
+        nu_gas={name: value for name, value in net.items() if name in species and value},
+        nu_site={name: value for name, value in net.items() if name in sites and value},
+        film={name: value for name, value in net.items() if name in films and value},
+        sticking=table.sticking,
     )
 
 
@@ -352,12 +350,12 @@ def _gas_reaction(
         raise reject(repr(table.A), _GAS_RATE.accepted, key="A") from None
     net = {name: right.get(name, 0.0) - left.get(name, 0.0) for name in dict.fromkeys((*left, *right))}
     return GasReaction(
-        key,
-        write_equation(left, right),
-        A,
-        table.b,
-        table.Ea,
-        table.reference_temperature,
-        dict.fromkeys(left, 1),
-        {name: value for name, value in net.items() if value},
+        key=key,
+        equation=write_equation(left, right),
+        A=A,
+        b=table.b,
+        Ea=table.Ea,
+        reference_temperature=table.reference_temperature,
+        reactants=dict.fromkeys(left, 1),
+        nu={name: value for name, value in net.items() if value},
     )

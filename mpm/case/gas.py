@@ -68,7 +68,11 @@ class Gas(Frozen):
         self._scaled = tuple(species.name for species in left_out)
         default = {
             species.name: scaled_diffusivity(
-                species, self.carrier, self.molar_mass, self.temperature, self.pressure
+                species,
+                self.carrier,
+                molar_mass=self.molar_mass,
+                temperature=self.temperature,
+                pressure=self.pressure,
             )
             for species in left_out
         }
@@ -98,6 +102,8 @@ class Gas(Frozen):
         if "viscosity" not in given and model is not None:
             values["viscosity"] = in_range("viscosity", model.viscosity(self.temperature), "Pa s")
         if "density" not in given:
-            density = ideal_gas_density(self.pressure, self.molar_mass, self.temperature)
+            density = ideal_gas_density(
+                pressure=self.pressure, molar_mass=self.molar_mass, temperature=self.temperature
+            )
             values["density"] = in_range("density", density, "kg/m^3")
         return self

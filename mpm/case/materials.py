@@ -17,6 +17,7 @@ from pydantic import BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchem
 
 from mpm.case.model import Frozen, nothing_required
 from mpm.constants import AVOGADRO
+from mpm.physics.porous import kozeny_carman, particle_surface
 from mpm.units import (
     Conductivity,
     Coverage,
@@ -144,8 +145,11 @@ class Material(Frozen):
     def _fill_in(self) -> Self:
         given, d = self.model_fields_set, self.particle_diameter
         values = self.__dict__
-        if self.kozeny_constant is not None and d is not None and "permeability" in given:
-            k = kozeny_carman(self.porosity, d, self.sphericity, self.kozeny_constant)
+        surface = None if d is None else particle_surface(self.porosity, d, self.sphericity)
+        if self.kozeny_constant is not None and surface is not None and "permeability" in given:
+            k = kozeny_carman(
+                porosity=self.porosity, surface_to_volume=surface, constant=self.kozeny_constant
+            )
             if any(abs(given_k - k) > 1e-9 * k for given_k in self.permeability):  # a resolved case has both
                 raise reject(
                     f"kozeny_constant, which makes {k:.4g} m^2, beside another permeability",
@@ -153,25 +157,24 @@ class Material(Frozen):
                     key="kozeny_constant",
                 )
         if "permeability" not in given:
-            if d is None:
+            if surface is None:
                 raise reject(
                     "nothing",
                     'a permeability, e.g. "4.25 um^2", or a particle_diameter, with which sphericity and kozeny_constant give one',
                     key="permeability",
                 )
             values["kozeny_constant"] = constant = self.kozeny_constant or PACKED_SPHERES
-            k = kozeny_carman(self.porosity, d, self.sphericity, constant)
+            k = kozeny_carman(porosity=self.porosity, surface_to_volume=surface, constant=constant)
             values["permeability"] = (in_range("permeability", k, "m^2"),) * 2
         if "tortuosity_factor" not in given:
             values["tortuosity_factor"] = (self.porosity**-0.5,) * 2
         if "surface_to_volume" not in given:
-            if d is None:
+            if surface is None:
                 raise reject(
                     "nothing",
                     'a surface per total volume, e.g. "58000 1/m", or a particle_diameter',
                     key="surface_to_volume",
                 )
-            surface = (1.0 - self.porosity) * 6.0 / (self.sphericity * d)
             values["surface_to_volume"] = in_range("surface_to_volume", surface, "1/m")
         if self.initial_coverage and abs(sum(self.initial_coverage.values()) - 1.0) > 1e-9:
             raise reject(
@@ -180,15 +183,6 @@ class Material(Frozen):
                 key="initial_coverage",
             )
         return self
-
-
-def kozeny_carman(porosity: float, diameter: float, sphericity: float, constant: float) -> float:
-    """Permeability k = eps^3 / (c0 s_v^2 (1 - eps)^2) [m2] with s_v = 6/(phi d), the surface per solid volume.
-
-    Equations 5-2 and 5-3 of the thesis; c0 = 5 for packed spheres (Carman 1937), 4.2 fitted for its glass beads (table 5.4).
-    """
-    solid_surface = 6.0 / (sphericity * diameter)
-    return porosity**3 / (constant * (solid_surface * (1.0 - porosity)) ** 2)
 
 
 _STEEL = {"density": "8030 kg/m^3", "heat_capacity": "503 J/kg/K", "conductivity": "16.3 W/m/K"}

@@ -31,7 +31,9 @@ def bond_numbers(spec: BoxSpec) -> dict[str, float]:
         real = powder.wall_hamaker if name == "base" else powder.hamaker
         for prefix, hamaker in (("", real * spec.cohesion), ("simulated_", spec.hamaker(name == "base"))):
             force = largest_force(hamaker, radius, powder.asperity)
-            out[f"{prefix}bond_number_{name}"] = granular_bond_number(force, powder.diameter, powder.density)
+            out[f"{prefix}bond_number_{name}"] = granular_bond_number(
+                cohesion=force, diameter=powder.diameter, density=powder.density
+            )
     return out
 
 
@@ -52,10 +54,16 @@ def bed_numbers(case: DemCase, spec: BoxSpec, heights: np.ndarray, solid: np.nda
         out["knudsen_number"] = gas.mean_free_path / d
     if gas is not None and porosity is not None:
         out["minimum_fluidisation_ergun"] = minimum_fluidisation_velocity(
-            d, powder.sphericity, powder.density, porosity, gas.viscosity, gas.density, *powder.ergun
+            diameter=d,
+            sphericity=powder.sphericity,
+            density_solid=powder.density,
+            porosity=porosity,
+            viscosity=gas.viscosity,
+            density_gas=gas.density,
+            ergun=powder.ergun,
         )
         out["minimum_fluidisation_wen_yu"] = wen_yu_minimum_fluidisation(
-            d, powder.density, gas.viscosity, gas.density
+            diameter=d, density_solid=powder.density, viscosity=gas.viscosity, density_gas=gas.density
         )
     out["weight_of_a_particle"] = powder.mass * GRAVITY
     return out

@@ -172,12 +172,19 @@ class GasInput(Section):
 
     @property
     def density(self) -> float:
-        return ideal_gas_density(self.pressure, self.molar_mass, self.temperature)
+        return ideal_gas_density(
+            pressure=self.pressure, molar_mass=self.molar_mass, temperature=self.temperature
+        )
 
     @property
     def mean_free_path(self) -> float:
         """Mean free path of the gas [m]."""
-        return mean_free_path(self.viscosity, self.pressure, self.temperature, self.molar_mass)
+        return mean_free_path(
+            viscosity=self.viscosity,
+            pressure=self.pressure,
+            temperature=self.temperature,
+            molar_mass=self.molar_mass,
+        )
 
 
 class RunInput(Section):

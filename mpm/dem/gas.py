@@ -76,11 +76,11 @@ class GasDrag:
             beta = gidaspow_beta(
                 1.0 - solids,
                 slip[one],
-                float(size),
-                self.powder.sphericity,
-                self.viscosity,
-                self.density,
-                *self.powder.ergun,
+                diameter=float(size),
+                sphericity=self.powder.sphericity,
+                viscosity=self.viscosity,
+                density=self.density,
+                ergun=self.powder.ergun,
             )
             gamma[one] = volume[one] * beta / ((1.0 - solids) ** 2 * solids)
         return gamma

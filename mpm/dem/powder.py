@@ -6,6 +6,8 @@ from statistics import NormalDist
 
 import numpy as np
 
+from mpm.physics.fluidisation import ERGUN
+
 from ..constants import GRAVITY
 
 SMALLEST = 0.2  # of the mean diameter: the smallest class; its collisions set the time step
@@ -35,7 +37,7 @@ class Powder:
     wall_hamaker: float = 6.2e-20
     asperity: float = 1e-9
     stiffness: float = 2500.0
-    ergun: tuple[float, float] = (150.0, 1.75)
+    ergun: tuple[float, float] = ERGUN
     measured_umf: float | None = None
     source: str = ""
 

@@ -1,4 +1,4 @@
-"""How fast a vibrated conveyor can carry a bed at all, and when a block on it slips.
+"""How fast a vibrated conveyor can carry a bed at all.
 
 SI throughout. "Seed" is the thesis whose chapters 2-5 the model follows; equation numbers are its own.
 """
@@ -30,18 +30,6 @@ def throw_number(acceleration: float, declination: float = 0.0) -> float:
     base, A_v/g, also where the conveyor is declined (section 3.6): 1.2 % less at 9 deg.
     """
     return acceleration / (GRAVITY * math.cos(declination))
-
-
-def slip_onset(friction: float, angle: float) -> tuple[float, float]:
-    """Throw numbers (forward, backward) above which a rigid block slips on a sinusoidal conveyor.
-
-    Gamma_forward = mu/(cot b + mu), Gamma_backward = mu/(cot b - mu) with b [rad] the angle of vibration from
-    the base (classic conveyor theory, e.g. Gaberson 1972; Sloot and Kruyt 1996). Backward is infinite when
-    mu >= cot b: the block never slips backwards.
-    """
-    cotangent = 1.0 / math.tan(angle)
-    backward = friction / (cotangent - friction) if cotangent > friction else math.inf
-    return friction / (cotangent + friction), backward
 
 
 def efficiency(mean_velocity: float, extension_velocity: float) -> float:

@@ -69,9 +69,9 @@ def carrier_ratio(species: Species, carrier: str, molar_mass: float) -> float | 
 
 
 def scaled_diffusivity(
-    species: Species, carrier: str, molar_mass: float, temperature: float, pressure: float
+    species: Species, carrier: str, *, molar_mass: float, temperature: float, pressure: float
 ) -> float:
     """D [m2/s] of `species` in the carrier at `temperature` [K] and `pressure` [Pa]; in an unknown carrier that in nitrogen."""
     ratio = carrier_ratio(species, carrier, molar_mass)
-    state = (temperature / REFERENCE_TEMPERATURE) ** EXPONENT * (REFERENCE_PRESSURE / pressure)
+    state = math.pow(temperature / REFERENCE_TEMPERATURE, EXPONENT) * (REFERENCE_PRESSURE / pressure)
     return REFERENCE_DIFFUSIVITY * state * (1.0 if ratio is None else ratio)

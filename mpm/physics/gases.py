@@ -7,12 +7,13 @@ Flow, 3rd ed. (2006), table 1-2 (within 2-3 % for 100-1500 K and 120-1500 K); He
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from mpm.constants import GAS_CONSTANT
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CarrierGas:
     """Properties of a carrier gas: molar mass [kg/mol] and the constants of Sutherland's viscosity."""
 
@@ -24,7 +25,7 @@ class CarrierGas:
     def viscosity(self, temperature: float) -> float:
         """Dynamic viscosity [Pa s] at `temperature` [K] by Sutherland's formula."""
         ratio = temperature / self.T0
-        return self.mu0 * ratio**1.5 * (self.T0 + self.S) / (temperature + self.S)
+        return self.mu0 * math.pow(ratio, 1.5) * (self.T0 + self.S) / (temperature + self.S)
 
 
 CARRIERS = {
@@ -47,6 +48,6 @@ def molar_density(pressure: float, temperature: float) -> float:
     return pressure / (GAS_CONSTANT * temperature)
 
 
-def ideal_gas_density(pressure: float, molar_mass: float, temperature: float) -> float:
+def ideal_gas_density(*, pressure: float, molar_mass: float, temperature: float) -> float:
     """Density p M/(R T) [kg/m3] of an ideal gas; pressure [Pa], molar mass [kg/mol], temperature [K]."""
     return pressure * molar_mass / (GAS_CONSTANT * temperature)

@@ -43,7 +43,7 @@ class Site:
     density: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Reaction:
     """What both kinds have: the key in the file, the equation, and k(T) = A (T/T_ref)^b exp(-Ea/(R T))."""
 
@@ -69,7 +69,7 @@ class _Reaction:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SurfaceReaction(_Reaction):
     """A gas meets a site: r = k C_gas theta_site [mol of events/m2/s].
 
@@ -89,20 +89,21 @@ class SurfaceReaction(_Reaction):
 
         Kinetic theory: the flux onto a wall is C sqrt(R T/(2 pi M)), of which the share `sticking_coefficient` reacts.
         """
-        if self.sticking is None:
-            return self._arrhenius(temperature)
         T = np.asarray(temperature, dtype=float)
         share = self.sticking_coefficient(T)
+        if share is None:
+            return self._arrhenius(T)
         return np.asarray(share * np.sqrt(GAS_CONSTANT * T / (2.0 * np.pi * molar_mass)))
 
-    def sticking_coefficient(self, temperature: ArrayLike) -> Floats:
+    def sticking_coefficient(self, temperature: ArrayLike) -> Floats | None:
         """Share of the collisions with the one site it consumes that react at `temperature` [K]: sticking (T/T_ref)^b exp(-Ea/(R T)).
+
+        None for a reaction whose rate constant is given by A.
 
         Chemkin and Cantera write the same as a T^b exp(-Ea/(R T)), that is with T_ref = 1 K (Cantera, "Sticking reactions"; Kee, Coltrin,
         Glarborg, Chemically Reacting Flow, 2003, section 11.5).
         """
-        assert self.sticking is not None
-        return np.asarray(self.sticking * self._activation(temperature))
+        return None if self.sticking is None else np.asarray(self.sticking * self._activation(temperature))
 
     @property
     def product_sites(self) -> tuple[str, ...]:
@@ -115,7 +116,7 @@ class SurfaceReaction(_Reaction):
         return self.nu_gas.get(self.gas, 0.0) / self.nu_site[self.site]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GasReaction(_Reaction):
     """Two species meet in the gas: r = k C_1 C_2 [mol of events/m3 of gas/s]; `nu` signed molecules per event."""
 
@@ -127,7 +128,7 @@ class GasReaction(_Reaction):
         return self._arrhenius(temperature)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Mechanism:
     """Species, sites and reactions, checked for balance. The carrier gas is not one of the species."""
 
