@@ -6,7 +6,7 @@ A verb's text is its docstring. Lines of it that begin with `mpm` or `mpirun` ar
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import typer
@@ -60,7 +60,9 @@ class Verbs(TyperGroup):
 class App(typer.Typer):
     """An application of `Verb`s."""
 
-    def command(self, name: str | None = None, **options: Any) -> Any:
+    def command[Function: Callable[..., Any]](
+        self, name: str | None = None, **options: Any
+    ) -> Callable[[Function], Function]:
         return super().command(name, **{"cls": Verb, **options})
 
 

@@ -25,6 +25,11 @@ def paragraph(words: str, bold: bool = False) -> str:
     return f"<p>{f'<b>{inner}</b>' if bold else inner}</p>" if words else ""
 
 
+def preformatted(lines: Iterable[str]) -> str:
+    """Lines whose characters stand below each other."""
+    return f"<pre>{escape(chr(10).join(lines))}</pre>"
+
+
 def table(rows: Iterable[tuple[str, str]], heading: str = "") -> str:
     """Labels and values; nothing for no rows. A label that begins with a hard space is a part of the one above it."""
     lines = [

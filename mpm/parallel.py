@@ -50,7 +50,8 @@ def on_root[T](comm: MPI.Comm, action: Callable[[], T]) -> T:
     good, value = comm.bcast(outcome, root=0)
     if not good:
         raise value
-    return value
+    result: T = value
+    return result
 
 
 class Scatter:

@@ -18,7 +18,7 @@ from mpm.advice.sketch import sketch
 from mpm.case.case import Case, load_case
 from mpm.case.marks import Marked
 from mpm.errors import InputError
-from mpm.markup import columns, escape, items, paragraph, table, text
+from mpm.markup import columns, items, paragraph, preformatted, table, text
 from mpm.output import results
 from mpm.report.notebook import result_html
 from mpm.report.verdict import verdict
@@ -56,8 +56,7 @@ class Check(Mapping[str, Any]):
         return page.getvalue().rstrip()
 
     def _repr_html_(self) -> str:
-        parts = [paragraph(self.case.title or "case", bold=True)]
-        parts.append(f"<pre>{escape(chr(10).join(sketch(self.case, PAGE)))}</pre>")
+        parts = [paragraph(self.case.title or "case", bold=True), preformatted(sketch(self.case, PAGE))]
         for heading, rows in case_sheet(self.case, self.numbers, Marked(self.case)).groups:
             pairs = [row for row in rows if not isinstance(row, Listing)]
             parts.append(table(pairs, heading))
