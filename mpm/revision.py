@@ -22,7 +22,8 @@ WITHOUT_NUMBERS = (
         "screen.py",
         "session.py",
     ),
-    *("advice/caveats.py", "advice/idle.py", "advice/notes.py", "advice/sketch.py", "advice/screen.py"),
+    *("advice/caveats.py", "advice/idle.py", "advice/limits.py", "advice/notes.py"),
+    *("advice/screen.py", "advice/sheet.py", "advice/sketch.py"),
     *(
         "report/quantities.py",
         "report/fieldnames.py",

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from mpm.advice.checks import check_case
-from mpm.advice.screen import case_sheet, print_report
+from mpm.advice.screen import PAGE, print_report
+from mpm.advice.sheet import case_sheet
 from mpm.advice.sketch import sketch
 from mpm.case.case import Case, load_case
 from mpm.case.marks import Marked
@@ -26,9 +27,6 @@ from mpm.screen import Listing, screen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-PAGE = 80
-"""Columns of a report where there is no terminal to go by."""
 
 
 class Check(Mapping[str, Any]):

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from mpm.advice.checks import check_case
-from mpm.advice.notes import notes, sites_per_square_nanometre, standard_flow
+from mpm.advice.engineering import sites_per_square_nanometre, standard_flow
+from mpm.advice.notes import notes
 from mpm.advice.screen import print_report
 from mpm.case.case import Case, load_case
 from mpm.case.marks import print_full
@@ -97,8 +98,10 @@ def test_what_is_silent_is_said() -> None:
 def test_the_hundredth_and_the_standard_flow() -> None:
     """n_s N_A = 0.0417 per nm2 against 1/0.24 per nm2, and q T0 p/(T p0): 4 mm at 3.5 cm/s and 473 K are 4.85 standard litres a minute."""
     assert sites_per_square_nanometre(6.92e-8) == pytest.approx(0.01 / 0.24, rel=2e-3)
-    assert standard_flow(1.4e-4, 473.0, 101325.0) * 6e7 == pytest.approx(4851.0, rel=1e-3)
-    assert standard_flow(1.0, 273.15, 50662.5) == 0.5
+    assert standard_flow(1.4e-4, temperature=473.0, pressure=101325.0) * 6e7 == pytest.approx(
+        4851.0, rel=1e-3
+    )
+    assert standard_flow(1.0, temperature=273.15, pressure=50662.5) == 0.5
 
 
 def test_json_has_the_same_numbers(capsys: pytest.CaptureFixture[str]) -> None:

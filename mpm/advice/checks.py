@@ -15,7 +15,8 @@ from mpm.advice.caveats import (
     steady_caveats,
 )
 from mpm.advice.idle import idle_keys
-from mpm.advice.notes import notes, per_minute, sites_per_square_nanometre, standard_flow
+from mpm.advice.limits import beyond_limits
+from mpm.advice.notes import notes
 from mpm.case.case import Case
 from mpm.case.geometry import Inlet, Layer
 from mpm.case.keys import values
@@ -33,17 +34,6 @@ from mpm.physics.mechanism import mole_fractions
 from mpm.physics.porous import effective_diffusivity
 from mpm.physics.saturation import coverage_met, slowest_turnover, uptake
 from mpm.plain import plain
-
-SMEARED = 0.1
-"""Numerical over molecular diffusion along x that deserves a warning: 0.44 raised the coverage before the inlet by 0.008 in the zone, 0.19
-by 0.002 (docs/open_question.md)."""
-CONTINUUM = 0.01
-"""Knudsen number of the pores from which slip counts: it adds 8 Kn to the permeability (Klinkenberg 1941), 8 % here."""
-FEW = 10.0
-"""Particles across a layer below which averages over its pores mean little: near a wall the porosity swings for about five diameters
-(Benenati and Brosilow 1962)."""
-DILUTE = 0.02
-"""Mass fraction above which a feed is no longer dilute: the gas keeps the density and viscosity of its carrier."""
 
 
 def check_case(case: Case) -> dict[str, Any]:
@@ -81,7 +71,7 @@ def check_case(case: Case) -> dict[str, Any]:
             layer.name: _pores(case, layer.material) for layer in case.geometry.layers if layer.material
         },
         "sites_per_nm2": {
-            layer.name: sites_per_square_nanometre(layer.material.site_density)
+            layer.name: eng.sites_per_square_nanometre(layer.material.site_density)
             for layer in case.geometry.layers
             if layer.material
         },
@@ -89,9 +79,9 @@ def check_case(case: Case) -> dict[str, Any]:
         "inlets": {inlet.name: _inlet(case, inlet) for inlet in case.geometry.inlets},
         "reactions": [str(r) for r in (*case.mechanism.surface_reactions, *case.mechanism.gas_reactions)],
     }
-    bed = case.geometry.moving_layer
-    if bed is not None:
-        report["bed"] = _bed(case, bed)
+    layer = case.geometry.moving_layer
+    if layer is not None:
+        report["bed"] = _bed(case, layer)
     report["origins"] = {value.name: value.origin for value in values(case)}
     report["notes"] = notes(case)
     report["without_effect"] = idle_keys(case)
@@ -145,22 +135,26 @@ def _motion(case: Case) -> dict[str, float | str | None]:
 
 
 def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
-    gas, bed = case.gas, case.geometry.moving_layer
-    standard = standard_flow(inlet.velocity * inlet.width, gas.temperature, gas.pressure)
+    gas, layer = case.gas, case.geometry.moving_layer
+    standard = eng.standard_flow(
+        inlet.velocity * inlet.width, temperature=gas.temperature, pressure=gas.pressure
+    )
     numbers: dict[str, Any] = {
         "velocity": inlet.velocity,
         "flow": inlet.velocity * inlet.width,
         "standard_flow": standard,
-        "sccm_per_metre": per_minute(standard),
+        "sccm_per_metre": eng.per_minute(standard),
         "mole_fractions": mole_fractions(case.mechanism, gas.molar_mass, inlet.mass_fractions),
-        "Re": eng.reynolds(gas.density, inlet.velocity, inlet.width, gas.viscosity),
+        "Re": eng.reynolds(
+            density=gas.density, velocity=inlet.velocity, length=inlet.width, viscosity=gas.viscosity
+        ),
         "concentrations": case.feed_concentrations(inlet.mass_fractions),
     }
     found = eng.inlet_excess(case, inlet)
-    if found is None or bed is None or bed.material is None:
+    if found is None or layer is None or layer.material is None:
         return numbers
     species, numbers["excess_number"], numbers["dose_ratio"] = found
-    mechanism, material = case.mechanism, bed.material
+    mechanism, material = case.mechanism, layer.material
     met = coverage_met(mechanism, species, material.initial_coverage, gas.temperature) or {}
     k = uptake(mechanism, species, met, gas.temperature)
     diffusivity = effective_diffusivity(
@@ -170,36 +164,44 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     surface = material.surface_to_volume
     numbers["species"] = species
     if diffusivity > 0.0:
-        numbers["Pe_bed"] = eng.peclet(velocity, bed.height, diffusivity)
-        numbers["Damkoehler_diffusion"] = eng.damkoehler_diffusion(surface, k, bed.height, diffusivity)
+        numbers["Pe_bed"] = eng.peclet(velocity=velocity, length=layer.height, diffusivity=diffusivity)
+        numbers["Damkoehler_diffusion"] = eng.damkoehler_diffusion(
+            surface_to_volume=surface, rate_constant=k, length=layer.height, diffusivity=diffusivity
+        )
     if k > 0.0:
-        numbers["front_thickness"] = eng.front_thickness(surface, k, diffusivity)
+        numbers["front_thickness"] = eng.front_thickness(
+            surface_to_volume=surface, rate_constant=k, diffusivity=diffusivity
+        )
         numbers["gas_lifetime"] = material.porosity / (surface * k)
         turnover = slowest_turnover(mechanism, species, met, gas.temperature)
         if turnover > 0.0:
             per_site = turnover * numbers["concentrations"][species]
             numbers["site_lifetime"] = material.site_density / per_site
     if velocity > 0.0:
-        numbers["Damkoehler_convection"] = eng.damkoehler_convection(surface, k, bed.height, velocity)
+        numbers["Damkoehler_convection"] = eng.damkoehler_convection(
+            surface_to_volume=surface, rate_constant=k, length=layer.height, velocity=velocity
+        )
     return numbers
 
 
-def _bed(case: Case, bed: Layer) -> dict[str, Any]:
-    gas, material, geometry = case.gas, bed.material, case.geometry
+def _bed(case: Case, layer: Layer) -> dict[str, Any]:
+    gas, material, geometry = case.gas, layer.material, case.geometry
     assert material is not None
     rising = max(
         (eng.rising_velocity(case, i.center) for i in geometry.inlets if i.side == "bottom"), default=0.0
     )
     numbers: dict[str, Any] = {
-        "height": bed.height,
+        "height": layer.height,
         "gas_velocity": rising,
         "spreading_length": eng.spreading_length(case),
-        "pressure_drop": gas.viscosity * rising * bed.height / material.permeability[1],
+        "pressure_drop": gas.viscosity * rising * layer.height / material.permeability[1],
     }
     if case.motion.mean_velocity != 0.0:
         numbers["residence_time"] = geometry.length / abs(case.motion.mean_velocity)
     if material.particle_diameter is not None:
-        numbers["Re_particle"] = eng.reynolds(gas.density, rising, material.particle_diameter, gas.viscosity)
+        numbers["Re_particle"] = eng.reynolds(
+            density=gas.density, velocity=rising, length=material.particle_diameter, viscosity=gas.viscosity
+        )
         if material.density is not None and material.density > gas.density:
             ergun = minimum_fluidisation_velocity(
                 diameter=material.particle_diameter,
@@ -221,68 +223,13 @@ def _bed(case: Case, bed: Layer) -> dict[str, Any]:
 
 
 def warnings(case: Case, report: dict[str, Any]) -> list[str]:
-    """What is legal but questionable, one sentence each. A number that `report` lacks was not finite."""
-    found = [
+    """What is legal but questionable, one sentence each."""
+    return [
         *profile_caveats(case),
         *gas_caveats(case),
         *mass_caveats(case),
         *feed_caveats(case),
         *steady_caveats(case),
         *output_caveats(case),
+        *beyond_limits(case, report),
     ]
-    motion, bed = report["motion"], report.get("bed", {})
-    speed = abs(case.motion.mean_velocity)
-    if case.motion.gamma > 0.0 and bed and speed > motion.get("perfect_flight", math.inf):
-        found.append(
-            f"the bed is conveyed at {speed * 100:.3g} cm/s, above perfect flight, "
-            f"{motion['perfect_flight'] * 100:.3g} cm/s: no particle hops that fast"
-        )
-    ratio = bed.get("gas_over_minimum_fluidisation", 0.0)
-    if ratio > 1.0:
-        found.append(
-            f"gas rises through the bed at {bed['gas_velocity'] * 100:.3g} cm/s, {ratio:.2g} times minimum fluidisation "
-            f"({bed['minimum_fluidisation_ergun'] * 100:.3g} cm/s, Ergun): a real bed would expand or bubble, the model keeps it packed; "
-            f"{1.0 / ratio:.2g} times the flow of the inlets below would leave it at rest"
-        )
-    for layer in case.geometry.layers:
-        size = layer.material.particle_diameter if layer.material is not None else None
-        if size is not None and layer.height < FEW * size:
-            found.append(
-                f"layer {layer.name} is {layer.height * 1e3:.3g} mm high, {layer.height / size:.2g} particles of {size * 1e6:.3g} um: "
-                f"below {FEW:g} it is no continuum, and porosity and permeability are not those of a deep bed"
-            )
-    for inlet in case.geometry.inlets:
-        feed = sum(inlet.mass_fractions.values())
-        if feed > DILUTE:
-            found.append(
-                f"inlet {inlet.name} feeds a mass fraction of {feed:.3g}, not dilute (above {DILUTE}): density and "
-                "viscosity stay those of the carrier"
-            )
-    layers = {layer.name: layer.material for layer in case.geometry.layers if layer.material is not None}
-    for name, pores in report["pores"].items():
-        kn = pores.get("Knudsen", math.inf)
-        if kn > CONTINUUM:
-            found.append(
-                f"layer {name}: Kn = {kn:.2g}, mean free path {_free_path(case) * 1e6:.2g} um over pores of "
-                f"{eng.pore_diameter(layers[name]) * 1e6:.3g} um: outside the continuum (Kn above {CONTINUUM:g}) gas slips at walls; "
-                f"permeability should be about 1 + 8 Kn = {1.0 + 8.0 * kn:.3g} times as large (Klinkenberg), D_eff smaller"
-            )
-    courant = report["run"].get("flow_courant", math.inf)
-    if courant > 1.0 and case.follows_cycle:
-        found.append(
-            f"the gas passes {courant:.2g} cells in a step of the cycle (CFL above 1): raise time.steps_per_cycle"
-        )
-    smeared = report["run"].get("numerical_diffusion", math.inf)
-    if smeared > SMEARED and case.fidelity != "steady":
-        otherwise = ", or fidelity averaged, which has no swinging gas" if case.fidelity == "resolved" else ""
-        found.append(
-            f"upwinding in columns of {report['mesh']['column_width'] * 1e3:.3g} mm adds {100 * smeared:.3g} per cent to diffusion "
-            f"along the bed: narrower columns (geometry.cell_width){otherwise}"
-        )
-    slide = speed * Schedule.from_case(case).dt / report["mesh"]["column_width"]
-    if case.fidelity == "averaged" and bed and slide > 1.0 + 1e-6:
-        found.append(
-            f"the bed moves {slide:.2g} columns in a step, which leaves stripes of single columns in the coverage: lower time.step "
-            f"to {math.ceil(1e4 * report['mesh']['column_width'] / speed) / 10:g} ms, unless means are all that is wanted"
-        )
-    return found

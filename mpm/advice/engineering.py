@@ -7,15 +7,19 @@ SI units throughout; velocities of gas are superficial. Conveying limits and min
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from mpm.case.case import Case
 from mpm.case.geometry import Inlet
 from mpm.case.materials import Material
+from mpm.constants import AVOGADRO
 from mpm.mesh.grid import Grid
 from mpm.motion.kinematics import Vibration
 from mpm.motion.schedule import Schedule
 from mpm.physics.saturation import molecules_per_site
 
+STANDARD_TEMPERATURE, STANDARD_PRESSURE = 273.15, 101325.0
+"""[K], [Pa]: what a standard cubic centimetre (sccm) of a mass flow controller refers to."""
 MEMORY_OF_A_RANK = 0.11e9
 """Interpreter, PETSc and MPI before there is a mesh [bytes]."""
 MEMORY_OF_A_CELL = 17.5e3
@@ -25,6 +29,7 @@ MEMORY_OF_A_CELL_AND_PHASE = 0.25e3
 
 
 def excess_number(
+    *,
     velocity: float,
     width: float,
     concentration: float,
@@ -38,57 +43,80 @@ def excess_number(
     return velocity * width * concentration / sites if sites > 0.0 else math.inf
 
 
-def inlet_excess(case: Case, inlet: Inlet) -> tuple[str, float, float | None] | None:
-    """Species, excess number and dose ratio of an inlet; None without a moving bed or a surface reaction.
+class Excess(NamedTuple):
+    """What an inlet feeds: molecules of its `species` per passing site, and how many times what saturation needs that is.
 
-    The dose ratio is the excess number over what saturation needs (`mpm.physics.saturation`): 1 molecule per site for TMA, 1.5
-    for water. None where the precursor never saturates the surface.
+    Saturation needs 1 molecule of TMA per site, 1.5 of water (`mpm.physics.saturation`). `dose_ratio` is None where the precursor never
+    saturates the surface.
     """
-    bed, species = case.geometry.moving_layer, case.mechanism.precursor(inlet.mass_fractions)
-    if bed is None or bed.material is None or species is None or case.motion.mean_velocity == 0.0:
+
+    species: str
+    per_site: float
+    dose_ratio: float | None
+
+
+def inlet_excess(case: Case, inlet: Inlet) -> Excess | None:
+    """The excess of an inlet; None without a moving bed or a surface reaction."""
+    layer, species = case.geometry.moving_layer, case.mechanism.precursor(inlet.mass_fractions)
+    if layer is None or layer.material is None or species is None or case.motion.mean_velocity == 0.0:
         return None
     concentration = case.feed_concentrations(inlet.mass_fractions)[species]
-    material = bed.material
+    material = layer.material
     if material.surface_to_volume == 0.0:
         return None
     excess = excess_number(
-        inlet.velocity,
-        inlet.width,
-        concentration,
-        case.motion.mean_velocity,
-        bed.height,
-        material.surface_to_volume,
-        material.site_density,
+        velocity=inlet.velocity,
+        width=inlet.width,
+        concentration=concentration,
+        bed_velocity=case.motion.mean_velocity,
+        bed_height=layer.height,
+        surface_to_volume=material.surface_to_volume,
+        site_density=material.site_density,
     )
     need = molecules_per_site(case.mechanism, species, material.initial_coverage, case.gas.temperature)
-    return species, excess, excess / need if need else None
+    return Excess(species, excess, excess / need if need else None)
 
 
-def reynolds(density: float, velocity: float, length: float, viscosity: float) -> float:
+def sites_per_square_nanometre(site_density: float) -> float:
+    """Sites per nm2 of particle surface, n_s N_A / 1e18, of a site density [mol/m2]."""
+    return site_density * AVOGADRO * 1e-18
+
+
+def standard_flow(flow: float, *, temperature: float, pressure: float) -> float:
+    """A flow [m2/s: m3/s per metre of depth] of an ideal gas at `temperature` and `pressure`, at standard conditions."""
+    return flow * (STANDARD_TEMPERATURE / temperature) * (pressure / STANDARD_PRESSURE)
+
+
+def per_minute(flow: float) -> float:
+    """A standard flow [m2/s] in sccm per metre of depth."""
+    return flow * 1e6 * 60.0
+
+
+def reynolds(*, density: float, velocity: float, length: float, viscosity: float) -> float:
     """Re = rho u l / mu."""
     return density * velocity * length / viscosity
 
 
-def peclet(velocity: float, length: float, diffusivity: float) -> float:
+def peclet(*, velocity: float, length: float, diffusivity: float) -> float:
     """Pe = u l / D: convection over diffusion."""
     return velocity * length / diffusivity
 
 
 def damkoehler_convection(
-    surface_to_volume: float, rate_constant: float, length: float, velocity: float
+    *, surface_to_volume: float, rate_constant: float, length: float, velocity: float
 ) -> float:
     """Da_I = S k l / u: reaction on fresh surface over convection along `length`."""
     return surface_to_volume * rate_constant * length / velocity
 
 
 def damkoehler_diffusion(
-    surface_to_volume: float, rate_constant: float, length: float, diffusivity: float
+    *, surface_to_volume: float, rate_constant: float, length: float, diffusivity: float
 ) -> float:
     """Da_II = S k l^2 / D_eff: reaction on fresh surface over diffusion across `length`, the square of Thiele's modulus."""
     return surface_to_volume * rate_constant * length**2 / diffusivity
 
 
-def front_thickness(surface_to_volume: float, rate_constant: float, diffusivity: float) -> float:
+def front_thickness(*, surface_to_volume: float, rate_constant: float, diffusivity: float) -> float:
     """sqrt(D_eff/(S k)) [m]: distance over which diffusing gas reacts away on fresh surface."""
     return math.sqrt(diffusivity / (surface_to_volume * rate_constant))
 
@@ -157,7 +185,7 @@ def rising_velocity(case: Case, x: float) -> float:
     return min(fastest, velocity)
 
 
-def courant(velocity: float, step: float, size: float) -> float:
+def courant(*, velocity: float, step: float, size: float) -> float:
     """u dt / dx: cells passed in a step; the flow treats convection explicitly and wants it below 1."""
     return abs(velocity) * step / size
 
@@ -178,8 +206,8 @@ def flow_courant(case: Case, grid: Grid) -> float:
         if geometry.layers[layer].material is None
     ]
     return max(
-        courant(vibration.ax * vibration.omega, step, grid.dx),
-        courant(vertical, step, min(across)) if across else 0.0,
+        courant(velocity=vibration.ax * vibration.omega, step=step, size=grid.dx),
+        courant(velocity=vertical, step=step, size=min(across)) if across else 0.0,
     )
 
 
@@ -195,9 +223,11 @@ def numerical_diffusion(case: Case, grid: Grid) -> float:
     slowest = min(case.gas.diffusivity.values(), default=0.0)
     if slowest == 0.0 or speed == 0.0:
         return 0.0
-    bed = case.geometry.moving_layer
-    tortuosity = bed.material.tortuosity_factor[0] if bed is not None and bed.material is not None else 1.0
-    half = 0.5 * peclet(speed * tortuosity, grid.dx, slowest)
+    layer = case.geometry.moving_layer
+    tortuosity = (
+        layer.material.tortuosity_factor[0] if layer is not None and layer.material is not None else 1.0
+    )
+    half = 0.5 * peclet(velocity=speed * tortuosity, length=grid.dx, diffusivity=slowest)
     return half / math.tanh(half) - 1.0
 
 

@@ -1,6 +1,6 @@
 """What decides the answer of a case without anybody having typed it, and numbers that `mpm check` cannot give. One sentence each.
 
-Nothing here is wrong with the case: warnings are in `mpm.advice.checks` and `mpm.advice.caveats`, keys that nothing reads in
+Nothing here is wrong with the case: warnings are in `mpm.advice.limits` and `mpm.advice.caveats`, keys that nothing reads in
 `mpm.advice.idle`.
 """
 
@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from mpm.advice.engineering import sites_per_square_nanometre
 from mpm.case.materials import SITE_DENSITIES, Material
-from mpm.constants import AVOGADRO
 from mpm.screen import figure
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-
-STANDARD_TEMPERATURE, STANDARD_PRESSURE = 273.15, 101325.0
-"""[K], [Pa]: what a standard cubic centimetre (sccm) of a mass flow controller refers to."""
 
 
 def notes(case: Case) -> list[str]:
@@ -24,25 +21,10 @@ def notes(case: Case) -> list[str]:
     return [*_bed_notes(case), *_site_notes(case), *_powder_notes(case)]
 
 
-def sites_per_square_nanometre(site_density: float) -> float:
-    """Sites per nm2 of particle surface, n_s N_A / 1e18, of a site density [mol/m2]."""
-    return site_density * AVOGADRO * 1e-18
-
-
-def standard_flow(flow: float, temperature: float, pressure: float) -> float:
-    """A flow [m2/s: m3/s per metre of depth] of an ideal gas at `temperature` and `pressure`, at standard conditions."""
-    return flow * (STANDARD_TEMPERATURE / temperature) * (pressure / STANDARD_PRESSURE)
-
-
-def per_minute(flow: float) -> float:
-    """A standard flow [m2/s] in sccm per metre of depth."""
-    return flow * 1e6 * 60.0
-
-
 def _bed_notes(case: Case) -> list[str]:
     """Whether anything moves."""
-    bed = case.geometry.moving_layer
-    if bed is None:
+    layer = case.geometry.moving_layer
+    if layer is None:
         porous = [layer.name for layer in case.geometry.layers if layer.material is not None]
         if not porous:
             return []
@@ -50,7 +32,7 @@ def _bed_notes(case: Case) -> list[str]:
         return [f"no layer moves, so nothing is conveyed and no dose per site can be given ({keys} = true)"]
     if case.conveying_velocity == 0.0:
         return [
-            f"layer {bed.name} does not move (motion.bed_velocity is 0 cm/s): no solids pass, so there is no dose per site and no "
+            f"layer {layer.name} does not move (motion.bed_velocity is 0 cm/s): no solids pass, so there is no dose per site and no "
             "time in the strip"
         ]
     return []
@@ -81,11 +63,11 @@ def _site_notes(case: Case) -> list[str]:
 
 def _powder_notes(case: Case) -> list[str]:
     """A powder of which too little is known to say when it fluidises."""
-    bed = case.geometry.moving_layer
-    if bed is None or bed.material is None:
+    layer = case.geometry.moving_layer
+    if layer is None or layer.material is None:
         return []
-    missing = [key for key in ("density", "particle_diameter") if getattr(bed.material, key) is None]
+    missing = [key for key in ("density", "particle_diameter") if getattr(layer.material, key) is None]
     if not missing:
         return []
-    keys = " and ".join(f"material.{bed.material_name}.{key}" for key in missing)
+    keys = " and ".join(f"material.{layer.material_name}.{key}" for key in missing)
     return [f"no minimum fluidisation can be given: {keys} {'are' if ' and ' in keys else 'is'} missing"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mpm.advice.checks import check_case
-from mpm.advice.screen import case_sheet
+from mpm.advice.sheet import case_sheet
 from mpm.case.keys import values
 from mpm.case.marks import MARKS, Marked
 from mpm.output.following import look
