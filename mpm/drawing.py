@@ -12,12 +12,13 @@ from matplotlib import style
 from mpm import units
 from mpm.errors import InputError
 from mpm.files import file_name, write_picture
-from mpm.output.results import Run, load_run, made_sites
+from mpm.output.results import Run, load_run
 from mpm.output.vtu import Snapshot
 from mpm.pictures.beside import beside_figure, same_grid
 from mpm.pictures.maps import map_figure, when
 from mpm.pictures.movie import KINDS, write_movie
 from mpm.pictures.standard import STYLE, at_time, chosen_limits, plot_run, plots_folder, snapshot_at
+from mpm.report.dosing import made_sites
 from mpm.report.fieldnames import Limits, field_name
 
 PICTURES = (".png", ".pdf", ".svg")

@@ -24,12 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from mpm.advice.engineering import inlet_excess
 from mpm.case.kinds import SEARCH, kind_of_directory, what_it_is
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
 from mpm.reactor.reactor import Reactor
 from mpm.reactor.sequence import Replay
+from mpm.report.dosing import inlet_excess
 
 if TYPE_CHECKING:
     from mpm.case.case import Case

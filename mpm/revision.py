@@ -25,7 +25,6 @@ WITHOUT_NUMBERS = (
     *("advice/caveats.py", "advice/idle.py", "advice/limits.py", "advice/notes.py"),
     *("advice/screen.py", "advice/sheet.py", "advice/sketch.py"),
     *(
-        "report/quantities.py",
         "report/fieldnames.py",
         "report/tables.py",
         "report/verdict.py",

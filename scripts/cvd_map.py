@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from mpm import Reactor, load_case
-from mpm.advice.engineering import inlet_excess
 from mpm.reactor.sequence import Replay
+from mpm.report.dosing import inlet_excess
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "results" / "cvd_map.json"

@@ -12,7 +12,7 @@ from mpm.errors import BalanceError
 from mpm.output.directory import RunDirectory
 from mpm.reactor.reactor import Reactor
 from mpm.report.balances import worst_balance
-from mpm.report.coating import Totals
+from mpm.report.records import Totals
 from mpm.transport.species import Transport
 
 from .cases import CASES, MPI, SHORT, TINY, assert_same_numbers, physical_numbers, zone

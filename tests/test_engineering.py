@@ -11,6 +11,7 @@ from mpm.advice.checks import check_case
 from mpm.case.case import Case, load_case
 from mpm.cli import main
 from mpm.mesh.grid import Grid
+from mpm.report.dosing import inlet_excess
 
 from .cases import COARSE
 
@@ -43,7 +44,7 @@ def test_excess_number(
             "geometry.inlet.tma.mass_fractions.TMA": mass_fraction,
         }
     )
-    found = eng.inlet_excess(changed, changed.geometry.inlets[1])
+    found = inlet_excess(changed, changed.geometry.inlets[1])
     assert found is not None
     species, excess, ratio = found
     assert species == "TMA"
@@ -98,7 +99,7 @@ def test_a_profile_that_does_not_belong_is_said(
 
 def test_dose_ratio_of_water_counts_three_molecules_for_two_sites() -> None:
     cycle = load_case("single_cycle")
-    found = {i.name: eng.inlet_excess(cycle, i) for i in cycle.geometry.inlets}
+    found = {i.name: inlet_excess(cycle, i) for i in cycle.geometry.inlets}
     assert found["purge1"] is None and found["purge2"] is None
     tma, water = found["tma"], found["water"]
     assert tma is not None and water is not None

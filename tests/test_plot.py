@@ -20,11 +20,12 @@ from mpm.errors import InputError
 from mpm.files import file_name
 from mpm.mesh.grid import Grid
 from mpm.output.directory import RunDirectory
-from mpm.output.results import Run, dosing_inlets, fed_species, load_run, sites_made_by
+from mpm.output.results import Run, load_run
 from mpm.pictures.curves import exit_profile_figure, history_figure, outlets_figure, profile_steps
 from mpm.pictures.maps import PLAIN, map_figure
 from mpm.pictures.outline import WIDTH, formula, spread
 from mpm.pictures.standard import Fields, draw_field, figures, plot_run
+from mpm.report.dosing import dosing_inlets, fed_species, sites_made_by
 
 SITE = "OAl(CH3)2"
 COVERAGE = f"theta_{SITE}"

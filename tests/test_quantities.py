@@ -3,7 +3,9 @@
 import pytest
 
 from mpm import Reactor, load_case
-from mpm.report.quantities import QUANTITIES, RATIO, flatten, known, quantity
+from mpm.report.quantities import QUANTITIES, known, quantity
+from mpm.report.quantity import RATIO
+from mpm.report.trees import flatten
 from tests.cases import COARSE
 
 

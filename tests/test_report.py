@@ -34,7 +34,7 @@ from mpm.page.numbers import accounts, groups
 from mpm.page.run_page import run_page
 from mpm.page.strip import LETTER, drawing
 from mpm.page.sweep_page import sweep_page
-from mpm.report.quantities import flatten
+from mpm.report.trees import flatten
 from mpm.report.verdict import verdict
 from tests.cases import COARSE, SHORT, TINY
 

@@ -33,6 +33,7 @@ from mpm.physics.mechanism import mole_fractions
 from mpm.physics.porous import effective_diffusivity
 from mpm.physics.saturation import coverage_met, slowest_turnover, uptake
 from mpm.plain import plain
+from mpm.report.dosing import inlet_excess
 
 
 def check_case(case: Case) -> dict[str, Any]:
@@ -149,7 +150,7 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
         ),
         "concentrations": case.feed_concentrations(inlet.mass_fractions),
     }
-    found = eng.inlet_excess(case, inlet)
+    found = inlet_excess(case, inlet)
     if found is None or layer is None or layer.material is None:
         return numbers
     species, numbers["excess_number"], numbers["dose_ratio"] = found

@@ -7,16 +7,13 @@ SI units throughout; velocities of gas are superficial. Conveying limits and min
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from mpm.case.case import Case
-from mpm.case.geometry import Inlet
 from mpm.case.materials import Material
 from mpm.constants import AVOGADRO
 from mpm.mesh.grid import Grid
 from mpm.motion.kinematics import Vibration
 from mpm.motion.schedule import Schedule
-from mpm.physics.saturation import molecules_per_site
 
 STANDARD_TEMPERATURE, STANDARD_PRESSURE = 273.15, 101325.0
 """[K], [Pa]: what a standard cubic centimetre (sccm) of a mass flow controller refers to."""
@@ -26,55 +23,6 @@ MEMORY_OF_A_CELL = 17.5e3
 """Flow factors, operators and fields [bytes]; measured, as the next one, at 28,000 and 99,000 cells."""
 MEMORY_OF_A_CELL_AND_PHASE = 0.25e3
 """Operators of one phase of the cycle in the resolved fidelity [bytes]."""
-
-
-def excess_number(
-    *,
-    velocity: float,
-    width: float,
-    concentration: float,
-    bed_velocity: float,
-    bed_height: float,
-    surface_to_volume: float,
-    site_density: float,
-) -> float:
-    """Precursor molecules fed per surface site that passes, gamma = v w C / (|u_bed| h S n_s) (thesis, 5-20)."""
-    sites = abs(bed_velocity) * bed_height * surface_to_volume * site_density
-    return velocity * width * concentration / sites if sites > 0.0 else math.inf
-
-
-class Excess(NamedTuple):
-    """What an inlet feeds: molecules of its `species` per passing site, and how many times what saturation needs that is.
-
-    Saturation needs 1 molecule of TMA per site, 1.5 of water (`mpm.physics.saturation`). `dose_ratio` is None where the precursor never
-    saturates the surface.
-    """
-
-    species: str
-    per_site: float
-    dose_ratio: float | None
-
-
-def inlet_excess(case: Case, inlet: Inlet) -> Excess | None:
-    """The excess of an inlet; None without a moving bed or a surface reaction."""
-    layer, species = case.geometry.moving_layer, case.mechanism.precursor(inlet.mass_fractions)
-    if layer is None or layer.material is None or species is None or case.motion.mean_velocity == 0.0:
-        return None
-    concentration = case.feed_concentrations(inlet.mass_fractions)[species]
-    material = layer.material
-    if material.surface_to_volume == 0.0:
-        return None
-    excess = excess_number(
-        velocity=inlet.velocity,
-        width=inlet.width,
-        concentration=concentration,
-        bed_velocity=case.motion.mean_velocity,
-        bed_height=layer.height,
-        surface_to_volume=material.surface_to_volume,
-        site_density=material.site_density,
-    )
-    need = molecules_per_site(case.mechanism, species, material.initial_coverage, case.gas.temperature)
-    return Excess(species, excess, excess / need if need else None)
 
 
 def sites_per_square_nanometre(site_density: float) -> float:

@@ -17,7 +17,8 @@ from mpm.case.schema import for_people, number_text
 from mpm.case.sources import built_in_files, read_toml, shared_geometry
 from mpm.errors import InputError
 from mpm.physics.gases import CARRIERS
-from mpm.report.quantities import flatten, quantity
+from mpm.report.quantities import quantity
+from mpm.report.trees import flatten
 
 RESULTS = Path("results")
 

@@ -9,7 +9,8 @@ from mpm.case.keys import Key, all_keys, find_keys, keys_of, unknown_key
 from mpm.errors import InputError
 from mpm.guide.catalogue import sections
 from mpm.guide.otherfiles import find_other_keys, other_keys
-from mpm.report.quantities import QUANTITIES, RATIO, Quantity, known, quantity
+from mpm.report.quantities import QUANTITIES, known, quantity
+from mpm.report.quantity import RATIO, Quantity
 
 _NAMES = {
     "geometry.layer": "bed",

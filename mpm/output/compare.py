@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.case.keys import values
 from mpm.errors import InputError, printable
-from mpm.report.quantities import Quantity, flatten, quantity
+from mpm.report.quantities import quantity
+from mpm.report.quantity import Quantity
 from mpm.report.tables import ROUNDING, TWICE, natural_scale
+from mpm.report.trees import flatten
 from mpm.screen import Sheet, say, together
 
 if TYPE_CHECKING:

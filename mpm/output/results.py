@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,6 @@ from mpm.errors import InputError, MpmError
 from mpm.mesh.grid import Grid
 from mpm.output.directory import RunDirectory
 from mpm.output.vtu import Snapshot, grid_points, grid_quads
-
-if TYPE_CHECKING:
-    from mpm.case.case import Inlet
 
 Floats = NDArray[np.float64]
 
@@ -119,31 +116,3 @@ def load_run(directory: str | Path, say: Callable[[str], None] | None = None) ->
     steps: list[tuple[float, str]] = unless_damaged(lambda: files.steps, [])
     origins: dict[str, str] = unless_damaged(files.read_origin, {})
     return Run(files, case, Grid.from_case(case), history, summary, steps, origins)
-
-
-def fed_by(inlet: Inlet, species: Sequence[str]) -> list[str]:
-    """Those of the `species` that an inlet feeds, in their order."""
-    return [name for name in species if inlet.mass_fractions.get(name, 0.0) > 0.0]
-
-
-def dosing_inlets(case: Case) -> list[Inlet]:
-    """Inlets that feed a species of the mechanism."""
-    return [inlet for inlet in case.geometry.inlets if fed_by(inlet, case.mechanism.species_names)]
-
-
-def fed_species(case: Case) -> list[str]:
-    """Species fed by any inlet, in the mechanism's order."""
-    fed = {name for inlet in case.geometry.inlets for name in fed_by(inlet, case.mechanism.species_names)}
-    return [name for name in case.mechanism.species_names if name in fed]
-
-
-def sites_made_by(case: Case, inlet: Inlet) -> tuple[str, ...]:
-    """Site species whose coverage this inlet's titration counts; empty when nothing it feeds reacts on the surface."""
-    species = case.mechanism.precursor(inlet.mass_fractions)
-    return () if species is None else case.mechanism.titrated_sites(species)
-
-
-def made_sites(case: Case) -> list[str]:
-    """Site species worth a map: of two that add up to one, the one the first dosing inlet makes."""
-    made = list(dict.fromkeys(site for inlet in dosing_inlets(case) for site in sites_made_by(case, inlet)))
-    return made[:1] if len(case.mechanism.site_names) == 2 else made

@@ -17,8 +17,9 @@ from mpm.page.run_page import RunPage, run_page
 from mpm.page.viewer import BUDGET, VALUES, looks, viewer
 from mpm.page.write import render
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import Quantity, flatten
+from mpm.report.quantity import Quantity
 from mpm.report.tables import natural_scale
+from mpm.report.trees import flatten
 
 MOST_RUNS = 6
 """Beyond that a sweep says more than runs side by side."""

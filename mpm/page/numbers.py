@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import Quantity, flatten, quantity
+from mpm.report.quantities import quantity
+from mpm.report.quantity import Quantity
 from mpm.report.tables import ROUNDING, natural_scale
+from mpm.report.trees import flatten
 
 GROUPS = (
     ("What leaves coated", ("titration.",)),

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from mpm.case.case import Case, Inlet, Outlet
-from mpm.output.results import fed_by
 from mpm.pictures.outline import OKABE_ITO, spread
+from mpm.report.dosing import fed_by
 
 WIDTH = 860.0
 """Length of the strip."""

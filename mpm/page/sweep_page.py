@@ -16,7 +16,8 @@ from mpm.page.numbers import shown
 from mpm.page.run_page import run_html, run_page
 from mpm.page.write import render, write_page
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import RATIO, Quantity, quantity
+from mpm.report.quantities import quantity
+from mpm.report.quantity import RATIO, Quantity
 from mpm.report.tables import ROUNDING
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mpm.output.results import Run, made_sites
+from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
 from mpm.page.fields import (
     FEWEST_TIMES,
@@ -22,6 +22,7 @@ from mpm.page.fields import (
     fewer_times,
     read_film,
 )
+from mpm.report.dosing import made_sites
 from mpm.report.fieldnames import field_name
 
 BUDGET = 5_000_000

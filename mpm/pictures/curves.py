@@ -14,12 +14,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mpm.labels import literal
-from mpm.output.results import Run, dosing_inlets, sites_made_by
+from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
 from mpm.pictures.maps import name_of, values_of
 from mpm.pictures.outline import MM, OKABE_ITO, formula
 from mpm.report.balances import LIMIT
 from mpm.report.coating import exit_column
+from mpm.report.dosing import dosed_species, dosing_inlets, sites_made_by
 from mpm.report.fieldnames import NOTHING
 
 Floats = NDArray[np.float64]
@@ -83,7 +84,7 @@ def titrations(run: Run) -> list[tuple[str, dict[str, Floats]]]:
         prefix = f"titration.{inlet.name}."
         curves = {kind: run.history[prefix + kind] for kind in TITRATION if prefix + kind in run.history}
         if curves:
-            species = run.case.mechanism.precursor(inlet.mass_fractions)
+            species = dosed_species(run.case, inlet)
             sites = " + ".join(map(formula, sites_made_by(run.case, inlet)))
             found.append(
                 (f"{sites}, made by {formula(species or '')} from inlet {literal(inlet.name)}", curves)

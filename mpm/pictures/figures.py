@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mpm.errors import InputError
+from mpm.report.dosing import fed_species, made_sites
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,8 +51,6 @@ def figure_of(run: Run, name: str | None, **options: Any) -> Figure:
 
 def field_called(run: Run, name: str | None) -> str:
     """The full name of what is meant."""
-    from mpm.output.results import fed_species, made_sites
-
     sites, species = made_sites(run.case), fed_species(run.case)
     if name is None:
         return f"theta_{sites[0]}" if sites else "velocity"

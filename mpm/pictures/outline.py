@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from mpm.case.case import Case, Inlet
 from mpm.labels import literal
 from mpm.mesh.grid import Grid
-from mpm.output.results import fed_by
+from mpm.report.dosing import fed_by
 
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 WIDTH = 9.0

@@ -20,10 +20,11 @@ import numpy as np
 
 from mpm.errors import InputError, printable
 from mpm.files import write_atomically
-from mpm.output.results import Run, fed_species, load_run, made_sites
+from mpm.output.results import Run, load_run
 from mpm.output.series import Series
+from mpm.report.dosing import fed_species, made_sites
 from mpm.report.fieldnames import FieldName, colour_limits, field_name, superscript
-from mpm.report.quantities import RATIO
+from mpm.report.quantity import RATIO
 
 VIEW, VIBRATION = "view.py", "vibration.py"
 TALLEST = 0.8

@@ -30,7 +30,7 @@ from matplotlib.figure import Figure
 
 from mpm.errors import InputError
 from mpm.files import file_name, write_picture
-from mpm.output.results import Run, fed_species, load_run, made_sites
+from mpm.output.results import Run, load_run
 from mpm.output.vtu import Snapshot
 from mpm.pictures.curves import (
     exit_profile_figure,
@@ -43,6 +43,7 @@ from mpm.pictures.curves import (
 )
 from mpm.pictures.maps import ends_of, map_figure, when
 from mpm.pictures.outline import OKABE_ITO
+from mpm.report.dosing import fed_species, made_sites
 from mpm.report.fieldnames import Limits, field_name
 
 log = logging.getLogger("mpm")

@@ -22,7 +22,7 @@ from mpm.files import read_text
 from mpm.output.directory import RunDirectory
 from mpm.parallel import is_root, on_root, total
 from mpm.reactor.sequence import March, Replay, unpack
-from mpm.report.coating import Totals
+from mpm.report.records import Totals
 
 if TYPE_CHECKING:
     from mpm.case.case import Case

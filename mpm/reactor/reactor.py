@@ -35,7 +35,7 @@ from mpm.reactor.sequence import March, Replay
 from mpm.reactor.steady import steady_problem
 from mpm.reactor.summary import history_row, summarise
 from mpm.report.balances import LIMIT, require_balance, worst_balance
-from mpm.report.coating import State, Totals
+from mpm.report.records import State, Totals
 from mpm.signals import stop_signals
 from mpm.transport.coverage import Bed
 from mpm.transport.dispersion import vibrational_dispersion

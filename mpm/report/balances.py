@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mpm.errors import BalanceError
-from mpm.report.coating import Totals, running_gas, running_surface
+from mpm.report.records import Totals, running_gas, running_surface
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -135,10 +135,15 @@ def film_made(case: Case, totals: Totals) -> dict[str, float]:
     return made
 
 
+def balance_errors(case: Case, totals: Totals) -> dict[str, float]:
+    """Of every species by its name, and of the `sites`."""
+    errors = {name: entry["balance_error"] for name, entry in species_balances(case, totals).items()}
+    return errors | {"sites": site_balance(case, totals)}
+
+
 def worst_balance(case: Case, totals: Totals) -> tuple[str, float]:
     """Name and relative error of the worst of all balances; one that is not a number is worse than any."""
-    errors = {name: entry["balance_error"] for name, entry in species_balances(case, totals).items()}
-    errors["sites"] = site_balance(case, totals)
+    errors = balance_errors(case, totals)
     errors |= {f"element {name}": error for name, error in element_balances(case, totals).items()}
     return max(errors.items(), key=lambda item: item[1] if item[1] == item[1] else float("inf"))
 

@@ -1,93 +1,30 @@
-"""What a run reports: titration, utilisation, outlet gas, parasitic growth, fronts.
+"""What comes out coated: coverage where solids leave a zone, the use made of the precursor, the film that has grown.
 
-Every quantity is defined in the docstring of the function that computes it and named as in `summary.json`. Amounts are per metre of depth.
-A number that cannot be computed is left out.
+Every quantity is defined in the docstring of the function that computes it. Amounts are per metre of depth. A number that cannot be
+computed is left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpm.mesh.grid import ON_EDGE, Grid
+from mpm.report.dosing import dosed_species, zone_of
+from mpm.report.records import State, Totals, running_surface
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Inlet, Zone
+    from mpm.case.case import Case, Zone
 
 Floats = NDArray[np.float64]
-NO_FLOW = 1e-12
-"""Share of the strip's volume that counts as nothing, per output (steady: per second); ports at 1 nm/s let out 1e-9 of it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Totals:
-    """Sums over all ranks since the start of a run [mol/m, m2], by species of the run (`names`).
-
-    `fed` (inlets, species), `out`, `back` (outlets, species), `out_volume`, `back_volume` (outlets,), `stored`, `stored_initially`
-    (species,) in the gas; `surface` (reactions, reactive rows, columns) and `gas` (reactions, zones + 1) events, the last by zone number
-    (0: none); `reactive_rows` the grid's rows with reactive surface; `slid` the bed's way relative to the reactor [m];
-    `sites`, `sites_initially` (site species,) on the solids in the strip, `sites_passed` those that left minus those that entered.
-    """
-
-    names: tuple[str, ...]
-    fed: Floats
-    out: Floats
-    back: Floats
-    out_volume: Floats
-    back_volume: Floats
-    stored: Floats
-    stored_initially: Floats
-    surface: Floats
-    gas: Floats
-    reactive_rows: NDArray[np.int64]
-    slid: float
-    sites: Floats
-    sites_initially: Floats
-    sites_passed: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Numbers of one instant: `theta` (sites, reactive rows, columns) and the CVD rate per zone and at its largest.
-
-    `cvd` is the integral of the rate over each zone's strip (zones + 1,) [mol/m/s], `cvd_max` the largest rate per total volume;
-    `concentration` the dosed species by name, (rows, columns) [mol/m3].
-    """
-
-    theta: Floats
-    reactive_rows: NDArray[np.int64]
-    cvd: Floats
-    cvd_max: float
-    concentration: Mapping[str, Floats]
-
-
-def running_surface(case: Case, names: tuple[str, ...]) -> list:
-    """Surface reactions whose gas is among the species of the run, in the mechanism's order."""
-    return [r for r in case.mechanism.surface_reactions if r.gas in names]
-
-
-def running_gas(case: Case, names: tuple[str, ...]) -> list:
-    """Gas reactions whose reactants all are."""
-    return [r for r in case.mechanism.gas_reactions if set(r.reactants) <= set(names)]
-
-
-def dosed_species(case: Case, inlet: Inlet) -> str | None:
-    """The precursor an inlet doses: its first species that reacts on surfaces, or None."""
-    return case.mechanism.precursor(inlet.mass_fractions)
 
 
 def titrated(case: Case, species: str, theta: Floats) -> Floats:
     """Share of the sites that the half-reactions of `species` have made, from coverages (sites, ...): `Mechanism.titrated_sites` summed."""
     names = case.mechanism.site_names
     return np.sum([theta[names.index(site)] for site in case.mechanism.titrated_sites(species)], axis=0)
-
-
-def zone_of(case: Case, inlet: Inlet) -> Zone | None:
-    return next((zone for zone in case.geometry.zones if zone.inlet == inlet.name), None)
 
 
 def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
@@ -158,71 +95,41 @@ def utilisation(case: Case, grid: Grid, totals: Totals) -> dict[str, float]:
     return result
 
 
-def outlet_fractions(
-    case: Case, totals: Totals, before: Totals | None
-) -> dict[str, dict[str, dict[str, float]]]:
-    """Flux-weighted mole fractions of what left each outlet since `before` (the previous output; None: since the start).
+def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[str, dict[str, float]]:
+    """Per solid product: `amount` [mol/m] on all surfaces since the start and, for the conveyed layer, what has grown since `before`.
 
-    Amount of the species over amount of gas (volume times p/(R T)); the carrier by difference. Gas drawn back in does not count. An
-    outlet that has let out nothing (`let_out`) has none.
+    `per_area` [mol/m2]: what has grown in that layer over the particle surface S h s that has been conveyed meanwhile by a distance s;
+    in the developed state, growth per cycle. (Steady: both per second.)
+    Over the whole surface of the layer where it does not move. `thickness` [m] =
+    per_area M / density, where the mechanism's film has both. Absent while nothing is conveyed.
     """
-    molar_density = case.gas.molar_density
-    result = {}
-    for k, outlet in enumerate(case.geometry.outlets):
-        volume = let_out(case, totals, before, k)
-        if volume is None:
-            continue
-        amounts = totals.out[k] - (before.out[k] if before else 0.0)
-        fractions = dict.fromkeys(case.mechanism.species_names, 0.0)
-        for name, amount in zip(totals.names, amounts, strict=True):
-            fractions[name] = float(amount / (volume * molar_density))
-        fractions[case.gas.carrier] = 1.0 - sum(fractions.values())
-        result[outlet.name] = {"x": fractions}
+    name = conveyed_layer(case)
+    result: dict[str, dict[str, float]] = {}
+    rows = np.zeros(len(totals.reactive_rows), dtype=bool)
+    area = 0.0
+    if name is not None:
+        layer = next(l for l in case.geometry.layers if l.name == name)
+        inside = grid.layer_rows(name)
+        rows = (totals.reactive_rows >= inside.start) & (totals.reactive_rows < inside.stop)
+        assert layer.material is not None
+        length = grid.length
+        if layer.moving and case.fidelity == "steady":
+            length = abs(case.motion.mean_velocity)
+        elif layer.moving:
+            length = case.direction * (totals.slid - (before.slid if before else 0.0))
+        area = layer.material.surface_to_volume * layer.height * length
+    for solid in case.mechanism.films:
+        amount = grown = 0.0
+        for index, reaction in enumerate(running_surface(case, totals.names)):
+            count = reaction.film.get(solid.name, 0.0)
+            amount += count * float(totals.surface[index].sum())
+            grown += count * float(
+                totals.surface[index][rows].sum() - (before.surface[index][rows].sum() if before else 0.0)
+            )
+        entry = {"amount": amount}
+        if area > 0.0:
+            entry["per_area"] = grown / area
+            if solid.density is not None and solid.molar_mass is not None:
+                entry["thickness"] = grown / area * solid.molar_mass / solid.density
+        result[solid.name] = entry
     return result
-
-
-def let_out(case: Case, totals: Totals, before: Totals | None, outlet: int) -> float | None:
-    """Volume [m2] that has left through an outlet since `before`; None where it is below NO_FLOW of the strip: rounding of no flow."""
-    volume = float(totals.out_volume[outlet] - (before.out_volume[outlet] if before else 0.0))
-    strip = case.geometry.length * sum(layer.height for layer in case.geometry.layers)
-    return volume if volume > NO_FLOW * strip else None
-
-
-def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:
-    """Parasitic gas reactions now: `rate_mean` over the strip, `rate_max` [mol/m3/s per total volume], `share_in_zone` of the integral."""
-    if not case.mechanism.gas_reactions:
-        return {}
-    whole = float(state.cvd.sum())
-    area = grid.length * float(grid.y[-1] - grid.y[0])
-    result: dict[str, Any] = {"rate_mean": whole / area, "rate_max": state.cvd_max}
-    if whole > 0.0:
-        result["share_in_zone"] = {
-            zone.name: float(state.cvd[number] / whole)
-            for number, zone in enumerate(case.geometry.zones, start=1)
-        }
-    return result
-
-
-def flatten(tree: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
-    """Nested tables as one table with dotted names."""
-    flat: dict[str, float] = {}
-    for key, value in tree.items():
-        name = f"{prefix}{key}"
-        if isinstance(value, Mapping):
-            flat.update(flatten(value, f"{name}."))
-        else:
-            flat[name] = value
-    return flat
-
-
-def nested(flat: Mapping[str, float], name: str) -> dict[str, Any]:
-    """The table `name` of a flat history row, as nested tables."""
-    tree: dict[str, Any] = {}
-    for key, value in flat.items():
-        parts = key.split(".")
-        if parts[0] == name:
-            branch = tree
-            for part in parts[1:-1]:
-                branch = branch.setdefault(part, {})
-            branch[parts[-1]] = value
-    return tree

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mpm import units
 from mpm.errors import InputError
-from mpm.report.quantities import RATIO
+from mpm.report.quantity import RATIO
 
 Floats = NDArray[np.float64]
 DECADES = 4

@@ -1,7 +1,6 @@
-"""Where precursors stand, where they have gone astray, and what has grown: the numbers of a run that look at places.
+"""Where the fronts of precursors and of the coverage stand.
 
-Everything is defined in the docstring of the function that computes it and named as in `summary.json` and `history.csv`. Amounts are per
-metre of depth. A number that does not exist, such as a front in a layer that the precursor has not reached, is left out.
+A number that does not exist, such as a front in a layer that the precursor has not reached, is left out.
 """
 
 from __future__ import annotations
@@ -13,16 +12,9 @@ from numpy.typing import NDArray
 
 from mpm.mesh.grid import ON_EDGE, Grid
 from mpm.report.balances import FLOOR
-from mpm.report.coating import (
-    State,
-    Totals,
-    conveyed_layer,
-    dosed_species,
-    let_out,
-    running_gas,
-    running_surface,
-    titrated,
-)
+from mpm.report.coating import titrated
+from mpm.report.dosing import dosed_species
+from mpm.report.records import State
 
 if TYPE_CHECKING:
     from mpm.case.case import Case, Inlet
@@ -173,97 +165,3 @@ def _height(grid: Grid, field: Floats, level: float, inlet: Inlet, along: int) -
     values = field[:, column]
     at = crossing(y, values, level) if inlet.side == "bottom" else crossing(-y[::-1], values[::-1], level)
     return at if at is None or inlet.side == "bottom" else -at
-
-
-def contamination(case: Case, grid: Grid, totals: Totals, state: State) -> dict[str, dict[str, float]]:
-    """Per zone and per precursor that this zone's own inlet does not dose: what has come over from other zones / all that has been fed.
-
-    What has come over is what the zone has consumed on surfaces and in the gas, has let out through its outlets and holds now in its
-    gas. It equals what has crossed the zone's ends, since the zone holds none at first. In the steady state, where amounts are per
-    second, what it holds does not count. An outlet belongs to the zone that holds its centre.
-    """
-    result: dict[str, dict[str, float]] = {}
-    porosity = np.array(
-        [layer.material.porosity if layer.material else 1.0 for layer in case.geometry.layers]
-    )[grid.row_layer]
-    weight = porosity * grid.dy * grid.dx
-    for species, field in state.concentration.items():
-        i = totals.names.index(species)
-        fed = float(totals.fed[:, i].sum())
-        if fed <= 0.0:
-            continue
-        for number, zone in enumerate(case.geometry.zones, start=1):
-            own = next((inlet for inlet in case.geometry.inlets if inlet.name == zone.inlet), None)
-            if own is not None and own.mass_fractions.get(species, 0.0) > 0.0:
-                continue
-            columns = grid.zone_of_column == number
-            amount = 0.0 if case.fidelity == "steady" else float(weight @ field[:, columns].sum(axis=1))
-            for index, reaction in enumerate(running_surface(case, totals.names)):
-                amount -= reaction.nu_gas.get(species, 0.0) * float(totals.surface[index][:, columns].sum())
-            for index, gas in enumerate(running_gas(case, totals.names)):
-                amount -= gas.nu.get(species, 0.0) * float(totals.gas[index, number])
-            for k, outlet in enumerate(case.geometry.outlets):
-                if zone.start <= outlet.center < zone.end:
-                    amount += float(totals.out[k, i] - totals.back[k, i])
-            result.setdefault(zone.name, {})[species] = max(amount, 0.0) / fed
-    return result
-
-
-def cvd_totals(case: Case, totals: Totals) -> dict[str, Any]:
-    """Events of the parasitic gas reactions over the run [mol/m]: `total`, and `total_in_zone` by zone."""
-    if not running_gas(case, totals.names):
-        return {}
-    per_zone = totals.gas.sum(axis=0)
-    zones = {zone.name: float(per_zone[number]) for number, zone in enumerate(case.geometry.zones, start=1)}
-    return {"total": float(per_zone.sum()), "total_in_zone": zones}
-
-
-def backflow(case: Case, totals: Totals, before: Totals | None) -> dict[str, dict[str, float]]:
-    """Per outlet: volume drawn back in over volume let out since `before` (None: since the start). A one-way outlet has 0."""
-    result = {}
-    for k, outlet in enumerate(case.geometry.outlets):
-        out = let_out(case, totals, before, k)
-        back = totals.back_volume[k] - (before.back_volume[k] if before else 0.0)
-        if out is not None:
-            result[outlet.name] = {"backflow": float(back / out)}
-    return result
-
-
-def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[str, dict[str, float]]:
-    """Per solid product: `amount` [mol/m] on all surfaces since the start and, for the conveyed layer, what has grown since `before`.
-
-    `per_area` [mol/m2]: what has grown in that layer over the particle surface S h s that has been conveyed meanwhile by a distance s;
-    in the developed state, growth per cycle. (Steady: both per second.)
-    Over the whole surface of the layer where it does not move. `thickness` [m] =
-    per_area M / density, where the mechanism's film has both. Absent while nothing is conveyed.
-    """
-    name = conveyed_layer(case)
-    result: dict[str, dict[str, float]] = {}
-    rows = np.zeros(len(totals.reactive_rows), dtype=bool)
-    area = 0.0
-    if name is not None:
-        layer = next(l for l in case.geometry.layers if l.name == name)
-        inside = grid.layer_rows(name)
-        rows = (totals.reactive_rows >= inside.start) & (totals.reactive_rows < inside.stop)
-        assert layer.material is not None
-        length = grid.length
-        if layer.moving and case.fidelity == "steady":
-            length = abs(case.motion.mean_velocity)
-        elif layer.moving:
-            length = case.direction * (totals.slid - (before.slid if before else 0.0))
-        area = layer.material.surface_to_volume * layer.height * length
-    for solid in case.mechanism.films:
-        amount = grown = 0.0
-        for index, reaction in enumerate(running_surface(case, totals.names)):
-            count = reaction.film.get(solid.name, 0.0)
-            amount += count * float(totals.surface[index].sum())
-            grown += count * float(
-                totals.surface[index][rows].sum() - (before.surface[index][rows].sum() if before else 0.0)
-            )
-        entry = {"amount": amount}
-        if area > 0.0:
-            entry["per_area"] = grown / area
-            if solid.density is not None and solid.molar_mass is not None:
-                entry["thickness"] = grown / area * solid.molar_mass / solid.density
-        result[solid.name] = entry
-    return result

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.markup import paragraph, table
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import flatten, quantity
+from mpm.report.quantities import quantity
 from mpm.report.tables import shown
+from mpm.report.trees import flatten
 from mpm.report.verdict import verdict
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from rich.console import Console
 from mpm.case.case import Case
 from mpm.errors import printable
 from mpm.mesh.grid import Grid
-from mpm.report.quantities import flatten, quantity
+from mpm.report.quantities import quantity
+from mpm.report.trees import flatten
 from mpm.screen import Listing, Sheet, number, say
 
 ROUNDING = 1e-12

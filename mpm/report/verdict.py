@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from mpm.report.dosing import dosed_species, zone_of
+
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
@@ -54,14 +56,14 @@ def _coating(case: Case, summary: Mapping[str, Any]) -> list[str]:
     alike: dict[tuple[str | None, str], list[str]] = {}
     for inlet in case.geometry.inlets:
         if "exit_mean" in reported.get(inlet.name, {}):
-            species = case.mechanism.precursor(inlet.mass_fractions)
+            species = dosed_species(case, inlet)
             alike.setdefault((species, _made(case, species)), []).append(inlet.name)
     return [_of_inlets(case, summary, species, made, names) for (species, made), names in alike.items()]
 
 
 def _no_coating(case: Case) -> str:
     """Why no coverage is reported where solids leave a zone."""
-    from mpm.report.coating import conveyed_layer, dosed_species, zone_of
+    from mpm.report.coating import conveyed_layer
 
     dosing = [inlet for inlet in case.geometry.inlets if dosed_species(case, inlet) is not None]
     if conveyed_layer(case) is None or not dosing:

@@ -21,7 +21,8 @@ from mpm.errors import InputError
 from mpm.files import file_name, write_picture
 from mpm.labels import literal
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import Quantity, quantity
+from mpm.report.quantities import quantity
+from mpm.report.quantity import Quantity
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
 from mpm.sweep.sweepfile import DEFAULT_PICTURES

@@ -10,7 +10,8 @@ from importlib import metadata
 from typing import Any
 
 from mpm.files import write_atomically
-from mpm.report.quantities import flatten, unit_of
+from mpm.report.quantities import unit_of
+from mpm.report.trees import flatten
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.plan import Point
 from mpm.sweep.point import error_of, program, status_of

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.advice.engineering import inlet_excess
 from mpm.case.case import Case
 from mpm.output.results import Run
+from mpm.report.dosing import inlet_excess
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab
 from reproduction.zone_rows import bed_front

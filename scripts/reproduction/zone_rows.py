@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.advice.engineering import inlet_excess
 from mpm.case.case import Case
-from mpm.output.results import Run, sites_made_by
+from mpm.output.results import Run
+from mpm.report.dosing import inlet_excess, sites_made_by
 from mpm.report.fronts import coverage_front, layer_mean
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab

@@ -10,7 +10,8 @@ import pytest
 
 import mpm
 from mpm.errors import InputError
-from mpm.report.quantities import flatten, unit_of
+from mpm.report.quantities import unit_of
+from mpm.report.trees import flatten
 from mpm.sweep import driver
 from mpm.sweep.cluster import Pool
 from mpm.sweep.layout import Layout
