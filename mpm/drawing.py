@@ -10,6 +10,7 @@ from pathlib import Path
 from matplotlib import style
 
 from mpm import units
+from mpm.case.kinds import DEM_RUN, SWEEP_RUN, kind_of_directory
 from mpm.errors import InputError
 from mpm.files import file_name, write_picture
 from mpm.output.results import Run, load_run
@@ -51,10 +52,11 @@ def draw(directories: Sequence[Path], wish: Wish, say: Say) -> dict[Path, str]:
     if len(directories) > 1:
         return _beside([load_run(directory, say) for directory in directories], wish, say)
     (directory,) = directories
-    if is_sweep(directory):
+    kind = kind_of_directory(directory)
+    if kind is SWEEP_RUN:
         return _sweep(directory, wish)
-    if is_dem(directory):
-        return dem_pictures(directory)
+    if kind is DEM_RUN:
+        return _particles(directory)
     if not wish.one_field:
         return plot_run(directory, say, wish.time)
     run = load_run(directory, say)
@@ -65,35 +67,21 @@ def check(directories: Sequence[Path], wish: Wish) -> None:
     """Refuse options that do not go together, and an output file of another kind."""
     single = len(directories) == 1
     if wish.movie and not single:
-        raise InputError.at("plot", "--movie", f"{len(directories)} directories", "one run", given="")
+        raise InputError.at("plot", "--movie", f"{len(directories)} directories", "one run")
     if wish.movie and wish.time is not None:
-        raise InputError.at(
-            "plot", "--movie", "--time as well", "one of them: a movie shows all times", given=""
-        )
+        raise InputError.at("plot", "--movie", "--time as well", "one of them: a movie shows all times")
     for option, value in (("--clim", wish.clim), ("-o", wish.output)):
         if value is not None and single and not wish.one_field:
-            raise InputError.at(
-                "plot", option, "no --field", f"{option} with --field NAME, for one picture", given=""
-            )
+            raise InputError.at("plot", option, "no --field", f"{option} with --field NAME, for one picture")
     kinds = KINDS if wish.movie else PICTURES
     if wish.output is not None and wish.output.suffix.lower() not in kinds:
         what = "a movie" if wish.movie else "a picture"
         raise InputError.at(
-            "plot", "-o", str(wish.output), f"for {what} a name that ends in {', '.join(kinds)}", given=""
+            "plot", "-o", str(wish.output), f"for {what} a name that ends in {', '.join(kinds)}"
         )
 
 
-def is_sweep(path: Path) -> bool:
-    """Whether `mpm sweep` wrote this directory."""
-    return (path / "sweep.json").exists() or (path / "driver").is_dir()
-
-
-def is_dem(path: Path) -> bool:
-    """Whether `mpm dem` did."""
-    return (path / "case.toml").is_file() and any(path.glob("seed_*"))
-
-
-def dem_pictures(directory: Path) -> dict[Path, str]:
+def _particles(directory: Path) -> dict[Path, str]:
     """The pictures that `mpm dem` has drawn. Raises InputError when it has not come to that."""
     found = sorted((directory / "plots").glob("*.png"))
     if not found:
@@ -185,10 +173,10 @@ def parse_time(text: str) -> float:
             seconds = units.parse(text, "s")
         except ValueError as error:
             raise InputError.at(
-                "plot", "--time", f"{text!r} ({error})", "a time such as 1.5 or '250 ms'", given=""
+                "plot", "--time", f"{text!r} ({error})", "a time such as 1.5 or '250 ms'"
             ) from None
     if not math.isfinite(seconds):
-        raise InputError.at("plot", "--time", repr(text), "a time such as 1.5 or '250 ms'", given="")
+        raise InputError.at("plot", "--time", repr(text), "a time such as 1.5 or '250 ms'")
     return seconds
 
 
@@ -198,7 +186,7 @@ def parse_clim(text: str) -> tuple[float, float]:
     try:
         low, high = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError.at("plot", "--clim", repr(text), accepted, given="") from None
+        raise InputError.at("plot", "--clim", repr(text), accepted) from None
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise InputError.at("plot", "--clim", repr(text), accepted, given="")
+        raise InputError.at("plot", "--clim", repr(text), accepted)
     return low, high

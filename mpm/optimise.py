@@ -13,7 +13,6 @@ from __future__ import annotations
 import csv
 import io
 import logging
-import math
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from mpm.advice.doses import Dose, checked_doses
 from mpm.case.kinds import SEARCH, kind_of_directory, what_it_is
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
@@ -33,29 +33,12 @@ from mpm.report.dosing import inlet_excess
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-    from mpm.case.geometry import Inlet
 
 log = logging.getLogger("mpm")
-RICHEST, LEANEST = 0.02, 1e-6  # mass fractions: dilute gas above, nothing happens below
-VELOCITIES = 5.0  # factor by which a port velocity may fall or rise
 STEP = 0.1  # first step of the search, in powers of e
 CLOSE = 1e-3  # relative change of the doses at which the search ends
 SLACK = 1e-4  # titration that may be missing
 MARGIN = 1e-3  # by how much the search aims higher, for its own tolerance
-
-
-@dataclass(frozen=True)
-class Dose:
-    """One number to choose: `key` of the case, its `start`, `lowest` and `highest` value, and its unit in the file."""
-
-    key: str
-    start: float
-    lowest: float
-    highest: float
-    unit: str = ""
-
-    def setting(self, value: float) -> float | str:
-        return f"{value!r} {self.unit}" if self.unit else value
 
 
 @dataclass(frozen=True)
@@ -72,75 +55,6 @@ class Point:
 
     def reaches(self, target: float) -> bool:
         return min(self.exits.values()) >= target - SLACK
-
-
-def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
-    """Mass fraction (and port velocity) of every dosed inlet, starting where the dose ratio is `target`.
-
-    Raises InputError for a case in which a steady dose has nothing to titrate, or more than one precursor could be meant.
-    """
-    doses = []
-    for inlet in case.geometry.inlets:
-        excess = inlet_excess(case, inlet)
-        if excess is None:
-            continue
-        species, _, ratio = excess
-        refuse_inlet(case, inlet)
-        if ratio is None:
-            raise InputError(
-                f"optimise: found inlet {inlet.name}, whose precursor {species} never saturates the surface; accepted: reactions that end"
-            )
-        fraction = inlet.mass_fractions[species] * target / ratio
-        key = f"geometry.inlet.{inlet.name}"
-        start = min(max(fraction, 2.0 * LEANEST), 0.5 * RICHEST)
-        doses.append(Dose(f"{key}.mass_fractions.{species}", start, LEANEST, RICHEST))
-        if velocities:
-            v = inlet.velocity
-            doses.append(Dose(f"{key}.velocity", v, v / VELOCITIES, v * VELOCITIES, "m/s"))
-    if not doses:
-        if case.conveying_velocity == 0.0:
-            found = "a bed that does not move"
-        elif not case.mechanism.surface_reactions:
-            found = "a mechanism without surface reactions"
-        else:
-            found = "no inlet that feeds a precursor of the surface reactions"
-        raise InputError(
-            f"optimise: found {found}; accepted: a bed that moves past one inlet or more that dose it"
-        )
-    return doses
-
-
-def checked_doses(case: Case, target: float, weight: float, velocities: bool, limit: int) -> list[Dose]:
-    """`doses_of` with the numbers of the command line checked, too. Raises InputError."""
-    if not 0.0 < target <= 1.0:
-        raise InputError(f"optimise: --target: found {target:g}; accepted: above 0 and at most 1")
-    if not 0.0 <= weight < math.inf:
-        raise InputError(f"optimise: --weight: found {weight:g}; accepted: a finite number from 0")
-    if limit < 1:
-        raise InputError(f"optimise: --limit: found {limit}; accepted: a whole number from 1")
-    return doses_of(case, target, velocities)
-
-
-def refuse_inlet(case: Case, inlet: Inlet) -> None:
-    """Raise InputError for a dosing inlet whose dose the search could not choose or whose effect it could not see."""
-    key = f"optimise: geometry.inlet.{inlet.name}"
-    fed = case.mechanism.precursors(inlet.mass_fractions)
-    if inlet.velocity == 0.0:
-        raise InputError(
-            f"{key}.velocity: found 0 m/s, a port that doses nothing; accepted: a velocity above 0 m/s"
-        )
-    if len(fed) > 1:
-        raise InputError(
-            f"{key}.mass_fractions: found the precursors {', '.join(fed)}; accepted: one in each inlet"
-        )
-    if not inlet.stays_open:
-        raise InputError(
-            f"{key}: found doses that end at {inlet.windows[-1][1]:g} s; accepted: an inlet that doses without end, as in a steady state"
-        )
-    if all(zone.inlet != inlet.name for zone in case.geometry.zones):
-        raise InputError(
-            f"{key}: found no zone that it doses, so that its exit is not known; accepted: a geometry.zone with inlet = {inlet.name!r}"
-        )
 
 
 class Search:

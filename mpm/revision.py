@@ -22,7 +22,7 @@ WITHOUT_NUMBERS = (
         "screen.py",
         "session.py",
     ),
-    *("advice/caveats.py", "advice/idle.py", "advice/limits.py", "advice/notes.py"),
+    *("advice/caveats.py", "advice/doses.py", "advice/idle.py", "advice/limits.py", "advice/notes.py"),
     *("advice/screen.py", "advice/sheet.py", "advice/sketch.py"),
     *(
         "report/fieldnames.py",

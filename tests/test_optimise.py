@@ -9,11 +9,12 @@ from typing import Any
 
 import pytest
 
+from mpm.advice.doses import doses_of
 from mpm.case.case import load_case
 from mpm.cli import main
 from mpm.cli.searchscreen import print_point
 from mpm.errors import ConvergenceError, InputError
-from mpm.optimise import Point, Search, doses_of, optimise
+from mpm.optimise import Point, Search, optimise
 from mpm.screen import screen
 
 from .cases import CASES, TINY, cycle, run, zone

@@ -13,6 +13,23 @@ from mpm.cli.complete import complete_run
 from mpm.launcher import rank
 from mpm.screen import say, screen
 
+FieldOption = Annotated[
+    str | None,
+    typer.Option(
+        "--field", metavar="NAME", help="one field of fields.pvd, such as x_TMA, theta_OH, pressure"
+    ),
+]
+TimeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--time", metavar="T", help="the stored time nearest to T, in s or with a unit (default: the last)"
+    ),
+]
+LimitsOption = Annotated[
+    str | None,
+    typer.Option("--clim", metavar="LO,HI", help="ends of the colour scale, in the unit it shows"),
+]
+
 
 @app.command()
 def report(
@@ -45,24 +62,9 @@ def plot(
         list[Path],
         typer.Argument(metavar="DIR...", help="a run, several runs to put beside each other, or a sweep"),
     ],
-    field: Annotated[
-        str | None,
-        typer.Option(
-            "--field", metavar="NAME", help="one field of fields.pvd, such as x_TMA, theta_OH, pressure"
-        ),
-    ] = None,
-    time: Annotated[
-        str | None,
-        typer.Option(
-            "--time",
-            metavar="T",
-            help="the stored time nearest to T, in s or with a unit (default: the last)",
-        ),
-    ] = None,
-    clim: Annotated[
-        str | None,
-        typer.Option("--clim", metavar="LO,HI", help="ends of the colour scale, in the unit it shows"),
-    ] = None,
+    field: FieldOption = None,
+    time: TimeOption = None,
+    clim: LimitsOption = None,
     streamlines: Annotated[
         bool, typer.Option("--streamlines", help="draw the gas's streamlines over the field")
     ] = False,

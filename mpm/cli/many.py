@@ -72,7 +72,8 @@ def optimise(
     loaded = load_case(case, parse_settings(settings))
     directory = output or Path("results") / "optimise" / Path(case).stem
 
-    from mpm.optimise import Search, checked_doses, make_directory, write_points
+    from mpm.advice.doses import checked_doses
+    from mpm.optimise import Search, make_directory, write_points
     from mpm.parallel import on_root
 
     from mpi4py import MPI  # isort: skip  (after mpm.optimise, which loads the finite-element stack)

@@ -55,9 +55,9 @@ def run(
 
     if resume and (overwrite or name == AUTO):
         other = "--overwrite" if overwrite else f"--name {AUTO}"
-        raise InputError.at("run", "--resume", f"{other} as well", "one of them", given="")
+        raise InputError.at("run", "--resume", f"{other} as well", "one of them")
     if output is not None and name is not None:
-        raise InputError.at("run", "--name", "--output as well", "one of them", given="")
+        raise InputError.at("run", "--name", "--output as well", "one of them")
     loaded = load_case(case, parse_settings(settings))
     directory = output or directory_named(Path(case).stem if name is None else name)
     if name == AUTO:
@@ -93,7 +93,7 @@ def resume(
     require_run(directory)
     case = load_case(directory / "case.toml", {} if end is None else {"time.end": end})
     if end is not None and case.fidelity == "steady":
-        raise InputError.at("resume", "--end", repr(end), "nothing: a steady state has no end", given="")
+        raise InputError.at("resume", "--end", repr(end), "nothing: a steady state has no end")
     summary = _compute(case, directory, True, False, quiet)
     _show(case, summary, directory, not no_report, quiet)
 

@@ -51,11 +51,9 @@ _FOR_REFERENCE = ("material", "chemistry.reaction")
 def write_new_case(path: Path, start: str = START) -> list[Path]:
     """Write the case file, and beside it the schema; returns both. Raises InputError rather than replace a case."""
     if path.exists() or path.is_symlink():
-        raise InputError.at(path, "", "a file that is there already", "the name of a new file", given="")
+        raise InputError.at(path, "", "a file that is there already", "the name of a new file")
     if not path.parent.is_dir():
-        raise InputError.at(
-            path, "", f"no directory {path.parent}", "a new file in one that exists", given=""
-        )
+        raise InputError.at(path, "", f"no directory {path.parent}", "a new file in one that exists")
     text = new_case(load_case(case_file(start)), path.parent.resolve())
     schema = path.with_name(SCHEMA_FILE)
     write_atomically(schema, json.dumps(case_schema(), indent=2) + "\n")
