@@ -45,7 +45,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["check", "single_zone", "--set", "motion.temperature=1 K"], ["temperature belongs elsewhere: gas.temperature"]),
         (["sweep", "dsoe"], ["a built-in one: dose, gamma, port_bed, tma_speed", "did you mean dose?"]),
         (["dem", "gl56_ari"], ["a built-in one: demo, gl223_sawtooth, gl56_air", "did you mean gl56_air?"]),
-        (["dem", "gl56_air", "--set", "powder=GL65"], ["GL50, GL29, GL56", "nearest: GL56"]),
+        (["dem", "gl56_air", "--set", "powder=GL65"], ["GL50, GL29, GL56", "did you mean GL56?"]),
     ],
 )  # fmt: skip
 def test_a_misspelt_name_lists_the_names_and_guesses(

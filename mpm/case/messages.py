@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -13,6 +13,8 @@ from mpm.case.materials import BUILT_IN
 from mpm.errors import InputError, nearest
 from mpm.units import Dimension, describe
 
+TAG = "kind"
+"""The key that says which of several kinds a table is."""
 _LATER = {"missing": 1, "too_short": 2}
 """A misspelt key is both unknown and missing: say the former. A list whose entries are all wrong counts as empty: say what is wrong."""
 
@@ -22,7 +24,7 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
     first = min(error.errors(include_url=False), key=lambda e: _LATER.get(e["type"], 0))
     kind, context = first["type"], first.get("ctx") or {}
     location = first["loc"]
-    key = address(location, data)
+    key = address([part for i, part in enumerate(location) if not _choices(model, location[:i])], data)
     if kind == "mpm":
         key = ".".join(part for part in (key, context.get("key", "")) if part)
         if context["found"] == "nothing":
@@ -36,23 +38,27 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
             given=context.get("given", ""),
         )
     if kind == "extra_forbidden":
-        return _unknown(source, key, str(location[-1]), known_keys(model, location[:-1]))
+        return _unknown(source, key, str(location[-1]), known_keys(model, location[:-1]), model)
     if kind == "missing":
         return _missing(source, key, _expected(_field(model, location)), location, data)
+    if kind.startswith("union_tag"):
+        tags = list(_choices(model, location))
+        given = context.get("tag")
+        found = "nothing" if given is None else repr(given)
+        return InputError.at(source, f"{key}.{TAG}", found, ", ".join(tags), known=tags, given=str(given))
     found = describe(first["input"])
     if kind == "literal_error":
         choices = [choice.strip("'") for choice in context["expected"].replace(" or ", ", ").split(", ")]
         return InputError.at(source, key, found, ", ".join(choices), known=choices, given=str(first["input"]))
     text = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    return InputError.at(source, key, found, _WORDS.get(kind, text), given="")
+    accepted = _expected(_field(model, location)) if kind == "tuple_type" else _WORDS.get(kind, text)
+    return InputError.at(source, key, found, accepted, given="")
 
 
-def _unknown(source: str, key: str, given: str, known: Sequence[str]) -> InputError:
-    """A key is unknown here: misspelt, or the key of another table of a case."""
-    from mpm.case.keytable import all_keys  # which needs the classes that call this
-
+def _unknown(source: str, key: str, given: str, known: Sequence[str], model: type[BaseModel]) -> InputError:
+    """A key is unknown here: misspelt, or the key of another table of the file."""
     accepted = f"one of {', '.join(known)}"
-    elsewhere = [entry.name for entry in all_keys() if entry.last == given]
+    elsewhere = [name for name in _all_keys(model) if name.rpartition(".")[2] == given]
     if elsewhere:
         accepted += f"; {given} belongs elsewhere: {', '.join(elsewhere)}"
         return InputError.at(source, key, "an unknown key", accepted, given="")
@@ -101,10 +107,13 @@ def _entry_and_others(location: Sequence[int | str], data: Any) -> tuple[str, li
 _WORDS = {
     "model_type": "a table",
     "dict_type": "a table",
+    "model_attributes_type": "a table",
     "string_type": "text in quotes",
-    "tuple_type": "a list of tables, [[...]]",
     "bool_type": "true or false",
+    "bool_parsing": "true or false",
     "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
     "too_short": "at least one entry",
 }
 
@@ -131,17 +140,60 @@ def known_keys(model: type[BaseModel], location: Sequence[int | str]) -> list[st
     return [field.alias or name for name, field in table.model_fields.items()] if table else []
 
 
-def _model(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel] | None:
-    """The model class of the table at `location`, walking through fields, tuples and dictionaries of models."""
+def _all_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """Every dotted key of a file; an entry of a list or of named tables as <name>."""
+    for name, field in model.model_fields.items():
+        key = prefix + (field.alias or name)
+        yield key
+        named = get_origin(field.annotation) in (tuple, dict)
+        keys = (
+            inner
+            for table in _tables(field.annotation)
+            for inner in _all_keys(table, f"{key}.<name>." if named else f"{key}.")
+        )
+        yield from dict.fromkeys(keys)
+
+
+def _tables(annotation: Any) -> list[type[BaseModel]]:
+    """The models that a field holds: alone, in a list, by name, or one of several."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [table for part in get_args(annotation) for table in _tables(part)]
+
+
+def _type(model: type[BaseModel], location: Sequence[int | str]) -> Any:
+    """The type at `location`, walking through fields, tuples and dictionaries of models, and tables of several kinds."""
     current: Any = model
     for part in location:
         if isinstance(current, type) and issubclass(current, BaseModel):
             field = _named_field(current, str(part))
             current = field.annotation if field else None
+        elif choices := _by_tag(current):
+            current = choices.get(str(part))
         else:
             current = next((a for a in get_args(current) if a not in (str, Ellipsis, type(None))), None)
-        if get_origin(current) in (Union, types.UnionType):
+        if get_origin(current) in (Union, types.UnionType) and not _by_tag(current):
             current = next((a for a in get_args(current) if a is not type(None)), None)
+    return current
+
+
+def _by_tag(annotation: Any) -> dict[str, type[BaseModel]]:
+    """The models of a table of several kinds by their tags; empty for another type."""
+    if get_origin(annotation) not in (Union, types.UnionType) or type(None) in get_args(annotation):
+        return {}
+    return {
+        tag: table for table in _tables(annotation) for tag in get_args(table.model_fields[TAG].annotation)
+    }
+
+
+def _choices(model: type[BaseModel], location: Sequence[int | str]) -> dict[str, type[BaseModel]]:
+    """The kinds of the table at `location`, where there are several: pydantic's next step is then the tag, which is no key."""
+    return _by_tag(_type(model, location))
+
+
+def _model(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel] | None:
+    """The model class of the table at `location`."""
+    current = _type(model, location)
     return current if isinstance(current, type) and issubclass(current, BaseModel) else None
 
 
@@ -158,7 +210,7 @@ def _expected(field: FieldInfo | None) -> str:
     for item in field.metadata if field else ():
         if isinstance(item, Dimension):
             return item.accepted
-    if field is not None and get_origin(field.annotation) is tuple:
+    if field is not None and get_origin(field.annotation) is tuple and _tables(field.annotation):
         return "a list of tables, [[...]]"
     if field is not None and field.annotation is int:
         return "a whole number"

@@ -7,18 +7,21 @@ diameters. Reading needs no LAMMPS.
 import hashlib
 import math
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
 
 from mpm.case.kinds import POWDER, read_input
+from mpm.case.messages import to_input_error
+from mpm.case.model import Frozen
 from mpm.case.names import powder_file
 from mpm.case.schema import DRAFT, finished
-from mpm.errors import InputError
+from mpm.case.sources import Table, set_key
 from mpm.physics.fluidisation import mean_free_path
 from mpm.physics.gases import ideal_gas_density
 from mpm.units import (
@@ -38,9 +41,8 @@ from mpm.units import (
 )  # fmt: skip
 
 from .powder import POWDERS, SMALLEST, Powder
-from .reading import one_line, set_dotted
 from .waveform import Waveform
-from .waveform_input import MeasuredInput, Section, WaveformInput
+from .waveform_input import MeasuredInput, WaveformInput
 
 MOST_SEEDS = 10_000
 Stiffness = Annotated[float, Dimension("N/m", "a spring stiffness", "30 N/m", above=0.0)]
@@ -53,7 +55,7 @@ MOST_PARTICLES = 5_000_000
 """More would take days for a cycle, and a box of some billions, by a slip of a unit, all memory before a word is said."""
 
 
-class PowderInput(Section):
+class PowderInput(Frozen):
     """A built-in powder by name (`powder = "GL56"`), or one described or overridden key by key."""
 
     base: Annotated[str | None, Field(json_schema_extra={"enum": [*POWDERS]})] = None
@@ -112,7 +114,7 @@ class PowderInput(Section):
         return Powder(name="powder", **{**defaults, **given})
 
 
-class BoxInput(Section):
+class BoxInput(Frozen):
     """The periodic box; length, depth and bed height in mean particle diameters.
 
     `reduced_cohesion`: scale the Hamaker constants with the spring (supplement B), which keeps collisions alike
@@ -147,7 +149,7 @@ class BoxInput(Section):
     """time steps in the shortest collision"""
 
 
-class GasInput(Section):
+class GasInput(Frozen):
     """Gas in the bed, aerated from below at the superficial `velocity` in the frame where the inlet rests.
 
     `frame = "lab"` is the seed's boundary condition (its inlet does not vibrate): the gas stands still while the
@@ -187,7 +189,7 @@ class GasInput(Section):
         )
 
 
-class RunInput(Section):
+class RunInput(Frozen):
     """Cycles per seed (the first `discard` are not averaged), the seeds, and the sampling of a cycle."""
 
     seeds: tuple[Annotated[int, Field(ge=1)], ...] = (1, 2, 3)
@@ -210,6 +212,8 @@ class RunInput(Section):
             if not 1 <= value <= MOST_SEEDS:
                 raise reject(describe(value), f"from 1 to {MOST_SEEDS} seeds")
             return tuple(range(1, value + 1))
+        if not isinstance(value, list | tuple):
+            raise reject(describe(value), "a number of seeds or a list of their numbers")
         return value
 
     @model_validator(mode="after")
@@ -225,7 +229,7 @@ class RunInput(Section):
         return self
 
 
-class ProfileInput(Section):
+class ProfileInput(Frozen):
     """`mean_velocity`: scale the fitted profile to this cycle mean; `residence_length`: of the distribution."""
 
     mean_velocity: Speed | None = None
@@ -234,7 +238,7 @@ class ProfileInput(Section):
     """length of the bed that the residence times are given for"""
 
 
-class DemCase(Section):
+class DemCase(Frozen):
     """A powder file."""
 
     title: str = "DEM substudy"
@@ -251,12 +255,7 @@ class DemCase(Section):
     """packings, cycles and sampling"""
     profile: ProfileInput = ProfileInput()
     """what is made of the velocity of the bed"""
-    directory: Annotated[Path, Field(exclude=True)] = Path()
-
-    @field_validator("powder", mode="before")
-    @classmethod
-    def by_name(cls, value: Any) -> Any:
-        return {"base": value} if isinstance(value, str) else value
+    _directory: Path = PrivateAttr(Path())
 
     @model_validator(mode="after")
     def baffle_fits(self) -> "DemCase":
@@ -297,7 +296,7 @@ class DemCase(Section):
         return self.powder.build()
 
     def build_waveform(self) -> Waveform:
-        return self.waveform.build(self.directory)
+        return self.waveform.build(self._directory)
 
     def diameters(self) -> np.ndarray:
         """Diameters of the size classes [m]."""
@@ -307,7 +306,7 @@ class DemCase(Section):
         """The resolved file, runnable as it is (paths of data files made absolute)."""
         data = self.model_dump(mode="json", exclude_none=True)
         if isinstance(self.waveform, MeasuredInput):
-            data["waveform"]["file"] = str((self.directory / self.waveform.file).resolve())
+            data["waveform"]["file"] = str((self._directory / self.waveform.file).resolve())
         return tomli_w.dumps(data)
 
     def content_hash(self) -> str:
@@ -321,7 +320,6 @@ class DemCase(Section):
 def powder_schema() -> dict[str, Any]:
     """JSON Schema of a powder file, for editors."""
     schema = finished(DemCase.model_json_schema())
-    del schema["properties"]["directory"]
     table = schema["properties"]["powder"]
     schema["properties"]["powder"] = {
         "description": table["description"],
@@ -340,16 +338,24 @@ def powder_schema() -> dict[str, Any]:
 def load_case(source: Path | str | Mapping[str, Any], overrides: Mapping[str, Any] | None = None) -> DemCase:
     """Read a powder file or a dict, with dotted overrides such as {"box.stiffness": "3 N/m"}."""
     if isinstance(source, Mapping):
-        name, directory, data = "powder file", Path(), dict(source)
+        name, directory, data = "powder file", Path(), deepcopy(dict(source))
     else:
         path = powder_file(source) if isinstance(source, str) else source
         name, directory = str(source), path.parent
         data = read_input(path, POWDER)
-    if "directory" in data:
-        raise InputError(f"{name}: directory: unknown key")
+    _spell_out_powder(data)
     for key, value in (overrides or {}).items():
-        data = set_dotted(data, key, value)
+        set_key(data, key, value, name)
+        _spell_out_powder(data)
     try:
-        return DemCase.model_validate({**data, "directory": directory})
+        case = DemCase.model_validate(data)
     except ValidationError as error:
-        raise InputError(one_line(name, error, DemCase)) from None
+        raise to_input_error(error, DemCase, data, name) from None
+    case._directory = directory
+    return case
+
+
+def _spell_out_powder(data: Table) -> None:
+    """The table that the name of a built-in powder stands for."""
+    if isinstance(data.get("powder"), str):
+        data["powder"] = {"base": data["powder"]}

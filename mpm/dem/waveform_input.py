@@ -4,8 +4,9 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from mpm.case.model import Frozen
 from mpm.units import Angle, Dimension, Frequency, Positive, worked_out
 
 from ..constants import GRAVITY
@@ -16,13 +17,7 @@ Acceleration = Annotated[float, Dimension("m/s^2", "an acceleration", "10.581 m/
 Inclination = Annotated[float, Dimension("rad", "an angle", "60 deg", above=0.0, below=math.pi / 2)]
 
 
-class Section(BaseModel):
-    """A table of a powder file."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
-
-
-class SineInput(Section):
+class SineInput(Frozen):
     """A pure sine of the vertical acceleration `gamma` g."""
 
     kind: Literal["sine"]
@@ -40,7 +35,7 @@ class SineInput(Section):
         return sine(self.gamma, self.frequency, self.angle, self.angle_from)
 
 
-class SawtoothInput(Section):
+class SawtoothInput(Frozen):
     """The pseudo-sawtooth with the displacement of a sine of the vertical acceleration `gamma` g."""
 
     kind: Literal["sawtooth"]
@@ -64,7 +59,7 @@ class SawtoothInput(Section):
         return Sawtooth(x, z, self.frequency, self.extension_ratio)
 
 
-class SeedInput(Section):
+class SeedInput(Frozen):
     """The seed's table 2.2: the first `harmonics` of each direction, scaled to the fundamental `gamma` g."""
 
     kind: Literal["seed"]
@@ -82,7 +77,7 @@ class SeedInput(Section):
         return cut if self.gamma is None else cut.scaled(self.gamma * GRAVITY / full.vertical[0].amplitude)
 
 
-class HarmonicInput(Section):
+class HarmonicInput(Frozen):
     """One harmonic of an acceleration."""
 
     amplitude: Acceleration
@@ -93,7 +88,7 @@ class HarmonicInput(Section):
     """phase in A cos(2 pi f t - phase)"""
 
 
-class HarmonicsInput(Section):
+class HarmonicsInput(Frozen):
     """Lists of harmonics, `[[waveform.horizontal]]` and `[[waveform.vertical]]`; A cos(2 pi f t - phase)."""
 
     kind: Literal["harmonics"]
@@ -113,7 +108,7 @@ class HarmonicsInput(Section):
         return HarmonicWaveform(horizontal, vertical, self.frequency).aligned()
 
 
-class MeasuredInput(Section):
+class MeasuredInput(Frozen):
     """Accelerations from a CSV file of t, a_x, a_z: one period (`table`) or a record to be fitted."""
 
     kind: Literal["table", "accelerometer"]
