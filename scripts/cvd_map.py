@@ -43,7 +43,7 @@ def measure() -> dict[str, dict[str, float]]:
     saturating = {}  # mass fractions at which the dose ratio is 1; the ratio is proportional to them
     for inlet in base.geometry.inlets:
         excess = inlet_excess(base, inlet)
-        if excess is not None:
+        if excess is not None and excess[2] is not None:
             saturating[inlet.name] = inlet.mass_fractions[excess[0]] / excess[2]
     flow: Replay | None = None
     for tma in RATIOS:

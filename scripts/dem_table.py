@@ -120,8 +120,8 @@ def measure(name: str, stiffness: float, seed: int, cycles: int, out: Path) -> N
     assert arrays is not None
     mass = simulation.spec.diameters[simulation.filling.classes] ** 3
     centre = arrays["cycle_end"][:, :, 0] @ (mass / mass.sum())
-    cycles = np.diff(centre) / simulation.period
-    kept = cycles[case.run.discard :]
+    speeds: np.ndarray = np.diff(centre) / simulation.period
+    kept = speeds[case.run.discard :]
     record = {
         "row": name,
         "stiffness": stiffness,
@@ -129,7 +129,7 @@ def measure(name: str, stiffness: float, seed: int, cycles: int, out: Path) -> N
         "particles": len(mass),
         "steps_per_cycle": simulation.steps * case.run.updates_per_cycle,
         "cpu_seconds_per_cycle": (time.process_time() - began) / max(case.run.cycles - before, 1),
-        "cycle_velocities": cycles.tolist(),
+        "cycle_velocities": speeds.tolist(),
         "mean_velocity": float(kept.mean()),
         "coordination": float(2.0 * arrays["pairs"][case.run.discard * case.run.samples_per_cycle :].mean()),
     }

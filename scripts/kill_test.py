@@ -137,7 +137,7 @@ def difference(one: Path, other: Path) -> float:
 class Bench:
     """Undisturbed runs and killed ones of one mode on `ranks` processes."""
 
-    def __init__(self, mode: str, ranks: int, folder: Path, moments: random.Random):
+    def __init__(self, mode: str, ranks: int, folder: Path, moments: random.Random) -> None:
         self.mode, self.ranks, self.folder, self.moments = mode, ranks, folder, moments
         case: Case = load_case(
             ROOT / "cases" / "single_zone.toml", {**MESH, **MODES[mode], "output.checkpoint": "50 ms"}

@@ -382,7 +382,7 @@ def test_a_case_travels_between_processes(case: Case) -> None:
 
 def test_a_case_is_frozen(case: Case) -> None:
     with pytest.raises(ValueError, match="frozen"):
-        case.motion.gamma = 0.5
+        setattr(case.motion, "gamma", 0.5)  # noqa: B010
 
 
 def test_reading_a_case_loads_no_solver() -> None:

@@ -205,7 +205,8 @@ def test_what_is_no_equation_is_told_how_to_write_one(equation: str) -> None:
 def test_every_reaction_conserves_elements_and_sites(case: Case) -> None:
     """Recounted here from the values, independently of the check at loading."""
     mechanism = case.mechanism
-    atoms = {x.name: x.elements for x in (*mechanism.species, *mechanism.sites, *mechanism.films)}
+    kept: list[Any] = [*mechanism.species, *mechanism.sites, *mechanism.films]
+    atoms = {x.name: x.elements for x in kept}
     for reaction in mechanism.surface_reactions:
         assert sum(reaction.nu_site.values()) == 0.0
         changes = {**reaction.nu_gas, **reaction.nu_site, **reaction.film}
@@ -245,7 +246,7 @@ def test_an_inline_mechanism_starts_from_nothing() -> None:
         example(chemistry={"mechanism": "inline", "species": {"Ar": {"molar_mass": "39.95 g/mol"}}})
     )
     assert case.mechanism.species_names == ("Ar",)
-    assert case.mechanism.surface_reactions == case.mechanism.gas_reactions == ()
+    assert (case.mechanism.surface_reactions, case.mechanism.gas_reactions) == ((), ())
 
 
 @pytest.mark.parametrize(

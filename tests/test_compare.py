@@ -65,7 +65,7 @@ def test_changed_numbers_leave_rounding_out() -> None:
     assert set(found) == {"species.TMA.fed", "titration.tma.exit_mean", "titration.tma.exit_min"}
     fed = found["species.TMA.fed"]
     assert fed.relative == pytest.approx(0.5)
-    assert (fed.quantity.of(3e-6), fed.quantity.unit_shown) == (pytest.approx(3.0), "umol/m")
+    assert fed.quantity.of(3e-6) == pytest.approx(3.0) and fed.quantity.unit_shown == "umol/m"
     assert found["titration.tma.exit_mean"].relative == pytest.approx(-0.5)
     assert found["titration.tma.exit_min"].first is None
     assert found["titration.tma.exit_min"].relative is None

@@ -14,7 +14,7 @@ from mpm.motion.kinematics import BedMotion
 pytestmark = pytest.mark.lammps
 
 
-def test_from_accelerometer_to_coating(tmp_path):
+def test_from_accelerometer_to_coating(tmp_path: Path) -> None:
     """Every step uses the file of the step before; the reactor's bed must move at the DEM's (scaled) mean.
 
     Fails if a file format, a frame or a phase convention no longer fits between two steps.

@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,16 @@ MASS = POWDERS["GL50"].mass
 INERTIA = 0.4 * MASS * (D / 2) ** 2
 
 
-def make(tmp_path, position, velocity=(), spin=(), steps=100.0, diameters=(D,), base=FLAT, **change):
+def make(
+    tmp_path: Path,
+    position: Any,
+    velocity: Any = (),
+    spin: Any = (),
+    steps: float = 100.0,
+    diameters: Any = (D,),
+    base: Any = FLAT,
+    **change: Any,
+) -> Any:
     """A box of a few GL50 particles, no cohesion and no body force unless asked."""
     from mpm.dem.box import Box, BoxSpec, Particles
 
@@ -44,13 +55,13 @@ def make(tmp_path, position, velocity=(), spin=(), steps=100.0, diameters=(D,), 
     return Box(spec, particles, spec.largest_timestep(), tmp_path)
 
 
-def energy(state, mass=MASS):
-    return 0.5 * mass * (state.velocity**2).sum() + 0.5 * INERTIA * (state.spin**2).sum()
+def energy(state: Any, mass: Any = MASS) -> float:
+    return float(0.5 * mass * (state.velocity**2).sum() + 0.5 * INERTIA * (state.spin**2).sum())
 
 
 @pytest.mark.parametrize("sizes", [(D,), (0.8 * D, 1.3 * D)], ids=["equal", "two sizes"])
 @pytest.mark.parametrize("e", [0.97, 0.6])
-def test_binary_restitution_and_momentum(tmp_path, e, sizes):
+def test_binary_restitution_and_momentum(tmp_path: Path, e: float, sizes: Any) -> None:
     """Head-on: relative velocity times -e, momentum kept, for equal particles (fast style) and two sizes."""
     a, b = sizes[0], sizes[-1]
     gap = 0.02 * D
@@ -65,7 +76,9 @@ def test_binary_restitution_and_momentum(tmp_path, e, sizes):
     assert masses @ after.velocity[:, 0] == pytest.approx(masses @ [0.1, -0.05], rel=1e-9)
 
 
-def impact(tmp_path, degrees, base=FLAT, steps=100.0, diameters=(D,)):
+def impact(
+    tmp_path: Path, degrees: float, base: Any = FLAT, steps: float = 100.0, diameters: Any = (D,)
+) -> Any:
     theta = math.radians(degrees)
     v = 0.1
     height = D / 2 + 0.02 * D * math.cos(theta)
@@ -82,7 +95,7 @@ def impact(tmp_path, degrees, base=FLAT, steps=100.0, diameters=(D,)):
     ("degrees", "exact"),
     [(20, 0.5059), (45, 0.5071), (60, 0.5770), (70, 0.7326), (76, 0.8163), (80, 0.8701), (85, 0.9356)],
 )
-def test_oblique_wall_impact(tmp_path, degrees, exact):
+def test_oblique_wall_impact(tmp_path: Path, degrees: float, exact: Any) -> None:
     """The seven tangential restitutions of the reference to 1 % and the normal one to 0.2 %.
 
     `fix wall/gran hooke/history` fails this at 45 degrees with 0.866.
@@ -94,7 +107,7 @@ def test_oblique_wall_impact(tmp_path, degrees, exact):
 
 
 @pytest.mark.parametrize("sizes", [(D,), (D, D * 1.0000001)], ids=["hooke", "granular"])
-def test_impact_on_a_frozen_particle_is_the_wall_law(tmp_path, sizes):
+def test_impact_on_a_frozen_particle_is_the_wall_law(tmp_path: Path, sizes: Any) -> None:
     """Head-on onto a frit particle: both pair styles must treat it as infinitely heavy and use the wall's values."""
     frit = frit_monolayer(10 * D, 10 * D, D)
     on_top = frit.positions[44]
@@ -107,13 +120,13 @@ def test_impact_on_a_frozen_particle_is_the_wall_law(tmp_path, sizes):
     assert after.velocity[0, 2] / speed == pytest.approx(0.83, rel=2e-3)
 
 
-def test_default_time_step_keeps_restitution(tmp_path):
+def test_default_time_step_keeps_restitution(tmp_path: Path) -> None:
     """At the default of 14 steps per collision the restitutions hold to 1.5 %."""
     tangential, normal, _ = impact(tmp_path, 45, steps=14.0)
     assert normal == pytest.approx(0.83, rel=0.015) and tangential == pytest.approx(0.5071, rel=0.015)
 
 
-def test_sliding_goes_over_into_rolling(tmp_path):
+def test_sliding_goes_over_into_rolling(tmp_path: Path) -> None:
     """A sphere set sliding on the base ends rolling at 5/7 of its speed, whatever the friction."""
     v0, g = 0.05, 9.81
     settled = D / 2 - MASS * g / 300.0
@@ -130,7 +143,7 @@ def test_sliding_goes_over_into_rolling(tmp_path):
 
 
 @pytest.mark.parametrize("e", [0.9, 0.6])
-def test_bouncing_particle_reaches_the_hard_sphere_heights(tmp_path, e):
+def test_bouncing_particle_reaches_the_hard_sphere_heights(tmp_path: Path, e: float) -> None:
     """Rebound heights fall by e^2 each time (the reference's dem02.csv): 0.424 and 0.362 of 0.5 with e 0.9, radius 0.1."""
     g, drop = 981.0, 8 * D
     with make(
@@ -147,7 +160,7 @@ def test_bouncing_particle_reaches_the_hard_sphere_heights(tmp_path, e):
             assert peak == pytest.approx(drop * e ** (2 * bounce), rel=0.01)
 
 
-def test_stacked_pair_overlaps_as_springs(tmp_path):
+def test_stacked_pair_overlaps_as_springs(tmp_path: Path) -> None:
     """Two particles at rest on the base: overlaps 2 m g/k at the wall and m g/k between them."""
     g, k = 9.81, 3.0
     with make(
@@ -165,7 +178,7 @@ SEPARATIONS = (0.0, 0.25e-9, 0.35e-9, 0.5e-9, 1e-9, 3e-9, 9e-9, 10.5e-9)
 
 
 @pytest.mark.parametrize("kind", ["pair", "wall", "frit"])
-def test_cohesion_force_follows_the_formula(tmp_path, kind):
+def test_cohesion_force_follows_the_formula(tmp_path: Path, kind: str) -> None:
     """Acceleration of a resting particle at eight separations against (2-6), within 0.5 % of the largest force."""
     p, k = POWDERS["GL50"], 30.0
     hamaker = cohesion.reduced_hamaker(p.hamaker if kind == "pair" else p.wall_hamaker, k, p.stiffness)
@@ -186,7 +199,7 @@ def test_cohesion_force_follows_the_formula(tmp_path, kind):
         assert pull == pytest.approx(exact, abs=5e-3 * cohesion.largest_force(hamaker, radius, p.asperity))
 
 
-def test_cohesion_between_very_different_sizes(tmp_path):
+def test_cohesion_between_very_different_sizes(tmp_path: Path) -> None:
     """A sixth of the diameter next to the whole: both tables are usable and hold the formula in contact."""
     p, small, k = POWDERS["GL50"], D / 6, 30.0
     position = [[3 * D, 5 * D, 5 * D], [3 * D + (D + small) / 2, 5 * D, 5 * D]]
@@ -200,7 +213,7 @@ def test_cohesion_between_very_different_sizes(tmp_path):
     assert force[0] == pytest.approx(cohesion.largest_force(hamaker, radius, p.asperity), rel=5e-3)
 
 
-def test_energy_is_never_gained(tmp_path):
+def test_energy_is_never_gained(tmp_path: Path) -> None:
     """Forty spinning particles in a closed box without body force: kinetic energy at rest of contacts only falls.
 
     Fails for a wrong sign in the damping, a tangential spring that does work, or too long a time step.
@@ -214,13 +227,13 @@ def test_energy_is_never_gained(tmp_path):
     spin = rng.normal(0, 2000.0, grid.shape)
     with make(tmp_path, grid, speed, spin, steps=14.0, restitution=0.9) as box:
         box.accelerate(0.0, -g)
-        history = []
+        course = []
         for _ in range(200):
             box.run(400)
             state = box.snapshot()
-            history.append(energy(state) + MASS * g * state.position[:, 2].sum())
+            course.append(energy(state) + MASS * g * state.position[:, 2].sum())
     start = 0.5 * MASS * (speed**2).sum() + 0.5 * INERTIA * (spin**2).sum() + MASS * g * grid[:, 2].sum()
-    history = np.array([start, *history])
+    history = np.array([start, *course])
     assert (
         np.diff(history).max() < 2e-3 * start
     )  # energy stored in springs at the moment of looking comes back
@@ -228,7 +241,7 @@ def test_energy_is_never_gained(tmp_path):
     assert history[-1] < 0.6 * start
 
 
-def test_explosion_is_named(tmp_path):
+def test_explosion_is_named(tmp_path: Path) -> None:
     """Two particles created deep inside each other: one typed error with the cause, not a LAMMPS stack."""
     from mpm.errors import ConvergenceError
 
@@ -242,7 +255,7 @@ def test_explosion_is_named(tmp_path):
 
 
 @pytest.mark.parametrize("x", [-1e-22, -0.0, 1.0, 1.0 - 1e-16, -3.0, 5.0 - 1e-15])
-def test_a_particle_on_the_seam_is_in_the_box(tmp_path, x):
+def test_a_particle_on_the_seam_is_in_the_box(tmp_path: Path, x: float) -> None:
     """x in box lengths: its remainder rounds onto the box's size. Fails when engine or search refuse it, or its contact is lost."""
     from mpm.dem.sampling import count_contacts, wrapped
 

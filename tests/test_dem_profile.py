@@ -5,6 +5,8 @@ import math
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,13 +28,13 @@ PHASE = np.arange(N) * 360.0 / N
 BASE = WAVE.velocity(PHASE / 360.0 / 16.0)
 
 
-def ideal_curve(liftoff, contact, flight):
+def ideal_curve(liftoff: float, contact: float, flight: float) -> Profile:
     flying = (PHASE - liftoff) % 360.0 < (contact - liftoff) % 360.0
     velocity = np.where(flying, np.array([[flight], [-0.004]]), BASE)
     return Profile(PHASE, velocity, (~flying).astype(float))
 
 
-def test_fit_recovers_an_ideal_profile():
+def test_fit_recovers_an_ideal_profile() -> None:
     """A curve that is piecewise gives back its phases to a sample and its flight velocity exactly."""
     fit = piecewise_fit(ideal_curve(97.85, 18.71, 0.01435), BASE)
     assert fit.liftoff == pytest.approx(97.85, abs=360 / N)
@@ -42,7 +44,7 @@ def test_fit_recovers_an_ideal_profile():
     assert fit.profile.velocity[1].mean() == pytest.approx(0.0, abs=1e-12)
 
 
-def test_fit_of_a_noisy_profile_keeps_the_phases():
+def test_fit_of_a_noisy_profile_keeps_the_phases() -> None:
     curve = ideal_curve(100.0, 20.0, 0.013)
     noise = np.random.default_rng(2).normal(0, 3e-4, N)
     fit = piecewise_fit(Profile(PHASE, curve.velocity + noise, curve.contact), BASE)
@@ -50,7 +52,7 @@ def test_fit_of_a_noisy_profile_keeps_the_phases():
     assert fit.flight[0] == pytest.approx(0.013, rel=0.02)
 
 
-def test_scaling_keeps_the_phases_and_gives_the_mean():
+def test_scaling_keeps_the_phases_and_gives_the_mean() -> None:
     curve = ideal_curve(97.85, 18.71, 0.0100)
     fit = piecewise_fit(curve, BASE)
     scaled = scaled_to_mean(fit, curve, BASE, 0.013)
@@ -58,7 +60,7 @@ def test_scaling_keeps_the_phases_and_gives_the_mean():
     assert (scaled.liftoff, scaled.contact) == (fit.liftoff, fit.contact)
 
 
-def test_reactor_reads_the_profile(tmp_path):
+def test_reactor_reads_the_profile(tmp_path: Path) -> None:
     """The written table has the agreed header, comments do not disturb, and the mean survives."""
     curve = ideal_curve(97.85, 18.71, 0.01435)
     path = tmp_path / "profile.csv"
@@ -69,28 +71,33 @@ def test_reactor_reads_the_profile(tmp_path):
     assert len(rows) == N + 1
 
 
-def test_a_profile_says_what_it_was_made_with(tmp_path):
+def test_a_profile_says_what_it_was_made_with(tmp_path: Path) -> None:
     """Fails when the reactor reads other conditions than the DEM vibrated under, or takes a sawtooth for a sine."""
     path = tmp_path / "profile.csv"
     ideal_curve(97.85, 18.71, 0.01435).write(path, ["a remark", conditions(WAVE, "harmonics").line()])
     made = read_profile(path).conditions
+    assert made is not None
     assert (made.frequency, made.waveform) == (16.0, "sine")
     assert (made.gamma, made.angle) == pytest.approx((0.3, math.radians(60.0)), rel=1e-6)
     assert conditions(Sawtooth(1e-4, 2e-4, 20.0), "sawtooth").waveform == "sawtooth"
 
 
-def test_flight_interval_interpolates_and_wraps():
+def test_flight_interval_interpolates_and_wraps() -> None:
     """A gap open from 300 over 360 to 60 degrees is one interval; ripples elsewhere do not count."""
     gap = np.maximum(0.0, np.cos(np.radians(PHASE)) - 0.5) + 1e-3 * np.sin(np.radians(7 * PHASE))
-    liftoff, contact = analysis.flight_interval(PHASE, gap, 0.01)
+    found = analysis.flight_interval(PHASE, gap, 0.01)
+    assert found is not None
+    liftoff, contact = found
     assert liftoff == pytest.approx(300.0, abs=2.0) and contact == pytest.approx(60.0, abs=2.0)
     assert analysis.flight_interval(PHASE, np.zeros(N), 0.01) is None
     assert analysis.flight_interval(PHASE, np.ones(N), 0.01) is None
 
 
-def test_acceleration_criterion():
+def test_acceleration_criterion() -> None:
     """Bed on the base until 100 degrees, then at constant speed: found there to a few samples, with the delay."""
-    phase, delay = analysis.acceleration_liftoff(ideal_curve(100.0, 350.0, BASE[0, 36]), BASE, 1 / 16)
+    found = analysis.acceleration_liftoff(ideal_curve(100.0, 350.0, BASE[0, 36]), BASE, 1 / 16)
+    assert found is not None
+    phase, delay = found
     assert phase == pytest.approx(100.0, abs=9.0)
     assert delay == pytest.approx(phase / 360.0 / 16.0, abs=1e-9)
     assert analysis.acceleration_liftoff(Profile(PHASE, BASE, np.ones(N)), BASE, 1 / 16) is None
@@ -102,14 +109,14 @@ def test_acceleration_criterion():
     )
 
 
-def test_phases_begin_at_zero():
+def test_phases_begin_at_zero() -> None:
     """Samples at interval ends numbered by their time: row and column must recover cycle and phase."""
     time = np.arange(1, 25)  # three cycles of eight samples, the first at 1/8 of a cycle
     assert (analysis.over_phase(time, 8, 1) == np.array([np.arange(8, 16), np.arange(16, 24)])).all()
     assert (analysis.over_phase(time, 8, 0)[0] == np.array([8, 1, 2, 3, 4, 5, 6, 7])).all()
 
 
-def test_self_diffusivity_of_a_random_walk():
+def test_self_diffusivity_of_a_random_walk() -> None:
     """Independent steps of variance s^2 per cycle give D = s^2/2T at any lag; common drift does not count."""
     rng = np.random.default_rng(0)
     sigma, period = np.array([2e-6, 1e-6, 0.5e-6]), 1 / 16
@@ -120,7 +127,7 @@ def test_self_diffusivity_of_a_random_walk():
     assert abs(diffusivity[0, 2]) < 0.03 * math.sqrt(diffusivity[0, 0] * diffusivity[2, 2])
 
 
-def test_residence_times_and_cycle_velocity():
+def test_residence_times_and_cycle_velocity() -> None:
     """Two layers at 1 and 2 cm/s, one particle at rest: times, the share that never arrives, the mass mean."""
     speeds = np.array([0.01, 0.02, 0.0])
     ends = np.zeros((5, 3, 3))
@@ -131,7 +138,7 @@ def test_residence_times_and_cycle_velocity():
     assert analysis.cycle_velocities({"cycle_end": ends}, mass, WAVE, 2) == pytest.approx([0.0075, 0.0075])
 
 
-def test_slab_volumes_add_up():
+def test_slab_volumes_add_up() -> None:
     """Spheres cut by slab edges: all volume is found, and a sphere cut at its middle is halved."""
     d = np.array([1.0, 2.0])
     solids = slab_solids(np.array([1.0, 2.0]), d, np.array([-1.0, 1.0, 2.0, 5.0]))
@@ -140,7 +147,7 @@ def test_slab_volumes_add_up():
 
 
 @pytest.mark.parametrize("name", ["GL56", "SS231"])
-def test_drag_carries_the_bed_at_minimum_fluidisation(name):
+def test_drag_carries_the_bed_at_minimum_fluidisation(name: str) -> None:
     """At Ergun's velocity for the voidage, the drag on a particle of a uniform bed is its weight."""
     p = POWDERS[name]
     air, mu = 1.206, 18e-6
@@ -158,7 +165,7 @@ def test_drag_carries_the_bed_at_minimum_fluidisation(name):
     assert GasDrag(p, mu, air, velocity, rests_in_lab=False).flux(0.01) == velocity
 
 
-def test_filling_touches_nothing_and_has_the_right_volume():
+def test_filling_touches_nothing_and_has_the_right_volume() -> None:
     """Loose packings do not overlap, hold every size class equally often, and fill 0.6 of the settled height."""
     sizes = POWDERS["GL56"].size_classes(5)
     d = POWDERS["GL56"].diameter
@@ -177,7 +184,7 @@ def test_filling_touches_nothing_and_has_the_right_volume():
     assert (filling.positions[:, 2] - diameter / 2 > 0.0).all()
 
 
-def test_sawtooth_has_its_height_width_and_no_holes():
+def test_sawtooth_has_its_height_width_and_no_holes() -> None:
     base = sawtooth_baffle(64 * 125e-6, 10 * 125e-6, 125e-6, 2e-3, 2e-3)
     assert base.top == pytest.approx(2e-3, rel=1e-6)
     assert tooth_area(base) == pytest.approx(0.5 * 2e-3 * 2e-3, rel=0.05)
@@ -190,7 +197,7 @@ def test_sawtooth_has_its_height_width_and_no_holes():
 SINE = {"powder": "GL56", "waveform": {"kind": "sine", "gamma": 0.3, "frequency": "16 Hz"}}
 
 
-def test_resolved_case_runs_as_it_is():
+def test_resolved_case_runs_as_it_is() -> None:
     case = load_case(SINE, {"box.stiffness": "300 N/m", "run.seeds": 2, "gas.velocity": "0.3 cm/s"})
     again = load_case(tomllib.loads(case.to_toml()))
     assert again.content_hash() == case.content_hash() and again.run.seeds == (1, 2)
@@ -221,14 +228,14 @@ def test_resolved_case_runs_as_it_is():
         ({"run.samples_per_cycle": 100}, "run.samples_per_cycle", "divisor"),
     ],
 )
-def test_bad_input_is_one_line_with_key_and_remedy(change, key, says):
+def test_bad_input_is_one_line_with_key_and_remedy(change: Any, key: Any, says: str) -> None:
     with pytest.raises(InputError) as info:
         load_case(SINE, change)
     message = str(info.value)
     assert f": {key}: " in message and says in message and "\n" not in message
 
 
-def test_import_without_lammps():
+def test_import_without_lammps() -> None:
     """`import mpm.dem` and reading a powder file load neither LAMMPS nor MPI."""
     code = (
         "import sys, mpm.dem, mpm.dem.case, mpm.dem.cli, mpm.dem.simulate, mpm.dem.run; "

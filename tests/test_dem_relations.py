@@ -1,6 +1,7 @@
 """Engineering relations against the seed's printed numbers; no LAMMPS."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ AIR = ideal_gas_density(pressure=101325.0, molar_mass=29e-3, temperature=293.15)
 MU = 18e-6
 
 
-def test_conveying_limits():
+def test_conveying_limits() -> None:
     """16 Hz, Gamma 0.30, 60 deg: 0.538 and 1.690 cm/s; throw number is the Gamma it was made from."""
     z = 0.30 * 9.81 / (2 * math.pi * 16) ** 2
     x = z / math.tan(math.radians(60))
@@ -41,7 +42,9 @@ def test_conveying_limits():
         (0.40, 0.007e6, 17.93e-12, (61.090, 94.950)),
     ],
 )
-def test_kozeny_constants_of_table_5_4(porosity, surface, permeability, constants):
+def test_kozeny_constants_of_table_5_4(
+    porosity: float, surface: float, permeability: float, constants: Any
+) -> None:
     """Fails when the permeability of table 5.4 does not lie between those of the constants that the rounding of its numbers allows."""
     high, low = (
         kozeny_carman(porosity=porosity, surface_to_volume=surface, constant=constant)
@@ -59,11 +62,11 @@ def test_kozeny_constants_of_table_5_4(porosity, surface, permeability, constant
         ("SS231", 10.2281, 12.8237),
     ],
 )
-def test_minimum_fluidisation_against_the_reference(name, ergun46, wen_yu):
+def test_minimum_fluidisation_against_the_reference(name: str, ergun46: float, wen_yu: float) -> None:
     """Reference table umf.csv at a voidage of 0.46 [cm/s]; Gidaspow's drag carries the bed at the same velocity."""
     p = POWDERS[name]
 
-    def ergun(porosity):
+    def ergun(porosity: float) -> float:
         return fluidisation.minimum_fluidisation_velocity(
             diameter=p.diameter, sphericity=p.sphericity, density_solid=p.density, porosity=porosity,
             viscosity=MU, density_gas=AIR, ergun=p.ergun,
@@ -72,8 +75,8 @@ def test_minimum_fluidisation_against_the_reference(name, ergun46, wen_yu):
     velocity = ergun(0.46)
     assert 100 * velocity == pytest.approx(ergun46, rel=1e-3)
     beta = fluidisation.gidaspow_beta(
-        0.46,
-        velocity / 0.46,
+        np.array(0.46),
+        np.array(velocity / 0.46),
         diameter=p.diameter,
         sphericity=p.sphericity,
         viscosity=MU,
@@ -90,7 +93,7 @@ def test_minimum_fluidisation_against_the_reference(name, ergun46, wen_yu):
     assert p.measured_umf is not None and ergun(0.40) < p.measured_umf < ergun(0.56)
 
 
-def test_drag_is_continuous_in_the_slip_and_finite_at_rest():
+def test_drag_is_continuous_in_the_slip_and_finite_at_rest() -> None:
     """Fails if the dilute branch divides by a slip of zero or has another limit there."""
     still, slow = (
         fluidisation.gidaspow_beta(
@@ -107,10 +110,10 @@ def test_drag_is_continuous_in_the_slip_and_finite_at_rest():
     assert np.isfinite(still).all()
 
 
-def test_granular_bond_numbers_of_the_seed():
+def test_granular_bond_numbers_of_the_seed() -> None:
     """23.8 (24, table 2.1), 19 and 76 (table 3.3); and 307 with the Hamaker constant of section 2.4.4."""
 
-    def bond_number(powder, *force):
+    def bond_number(powder: Any, *force: Any) -> float:
         return fluidisation.granular_bond_number(
             cohesion=largest_force(*force), diameter=powder.diameter, density=powder.density
         )
@@ -124,14 +127,14 @@ def test_granular_bond_numbers_of_the_seed():
     assert bond_number(gl50, 4e-19, 12.5e-6, 1e-9) == pytest.approx(307, rel=5e-3)
 
 
-def test_rumpf_force_is_held_inside_and_ends_outside():
+def test_rumpf_force_is_held_inside_and_ends_outside() -> None:
     s = np.array([-1e-9, 0.0, 0.3e-9, 0.4e-9, 9.9e-9, 10.1e-9])
     f = rumpf_force(s, 3.1e-20, 12.5e-6, 1e-9)
     assert f[0] == f[1] == f[2] > f[3] > f[4] > 0.0 == f[5]
     assert reduced_hamaker(3.1e-20, 25.0, 2500.0) == pytest.approx(3.1e-21)
 
 
-def test_mean_free_path_of_the_seed():
+def test_mean_free_path_of_the_seed() -> None:
     """About 25 um in N2 at 2 Torr (supplement A)."""
     path = fluidisation.mean_free_path(
         viscosity=17.6e-6, pressure=2 * 133.32, temperature=293.15, molar_mass=28.01e-3
@@ -139,7 +142,7 @@ def test_mean_free_path_of_the_seed():
     assert path == pytest.approx(25e-6, rel=0.05)
 
 
-def test_collision_time_and_damping():
+def test_collision_time_and_damping() -> None:
     """An undamped collision takes pi sqrt(m/k); the damping of (2-5) gives back its restitution."""
     assert Contact(3.0, 1.0, 0.3).duration(8e-11) == pytest.approx(math.pi * math.sqrt(8e-11 / 3.0))
     contact = Contact(300.0, 0.83, 0.4)
@@ -148,7 +151,7 @@ def test_collision_time_and_damping():
 
 
 @pytest.mark.parametrize("count", [1, 3, 5, 8])
-def test_size_classes_keep_mean_and_spread(count):
+def test_size_classes_keep_mean_and_spread(count: int) -> None:
     p = POWDERS["GL56"]
     sizes = p.size_classes(count)
     assert sizes.mean() == pytest.approx(p.diameter) and len(sizes) == count
@@ -157,7 +160,7 @@ def test_size_classes_keep_mean_and_spread(count):
 
 
 @pytest.mark.parametrize("count", [2, 5, 20])
-def test_a_distribution_too_wide_for_its_classes_is_refused(count):
+def test_a_distribution_too_wide_for_its_classes_is_refused(count: int) -> None:
     """Fails when sizes below a fifth of the mean are cut off, which shifts the mean asked for, or a spread that fits is refused."""
     case = {
         "powder": {"base": "GL56"},
@@ -172,7 +175,7 @@ def test_a_distribution_too_wide_for_its_classes_is_refused(count):
         load_case(case, {"powder.deviation": f"{1.001 * largest!r} m"})
 
 
-def test_bond_numbers_are_those_of_the_base_that_is_simulated():
+def test_bond_numbers_are_those_of_the_base_that_is_simulated() -> None:
     """GL56 over a frit of 25 um: fails when the flat wall's 76 (the seed's table 3.3) is told of a box whose particles meet 23.5, or the
     scaling with the spring is not told."""
     case = {
@@ -197,7 +200,7 @@ def test_bond_numbers_are_those_of_the_base_that_is_simulated():
 @pytest.mark.parametrize(
     "change", [{"box.length": 1e9}, {"box.height": 1e20}, {"box.base": "frit", "box.frit_diameter": "1 nm"}]
 )
-def test_a_box_that_no_memory_holds_is_refused(change):
+def test_a_box_that_no_memory_holds_is_refused(change: Any) -> None:
     """Fails when a slip of a unit fills the memory instead of being named."""
     case = {"powder": "GL56", "waveform": {"kind": "sine", "gamma": 0.3, "frequency": "16 Hz"}}
     with pytest.raises(InputError, match=r"box: found a box of about .* up to 5,000,000"):

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -41,19 +42,19 @@ dump_per_cycle = 4
 
 
 @pytest.fixture
-def tiny(tmp_path):
+def tiny(tmp_path: Path) -> Path:
     path = tmp_path / "tiny.toml"
     path.write_text(TINY)
     return path
 
 
-def state(directory, seed=1):
+def state(directory: Path, seed: int = 1) -> dict[str, np.ndarray]:
     with np.load(directory / f"seed_{seed}" / "state.npz") as archive:
         return dict(archive)
 
 
 @pytest.mark.lammps
-def test_run_writes_everything_and_resumes(tiny, tmp_path):
+def test_run_writes_everything_and_resumes(tiny: Path, tmp_path: Path) -> None:
     """One run in detail: files, finite SI summary, consistent means; then refusal, resume with more cycles."""
     out = tmp_path / "out"
     assert main(["dem", str(tiny), "-o", str(out), "-q", "-j", "1"]) == 0
@@ -96,7 +97,7 @@ def test_run_writes_everything_and_resumes(tiny, tmp_path):
 @pytest.mark.lammps
 @pytest.mark.skipif(shutil.which("mpirun", path=str(Path(sys.executable).parent)) is None, reason="no mpirun")
 @pytest.mark.skipif("PMI_SIZE" in os.environ, reason="starts its own mpirun")
-def test_ranks_share_the_seeds_or_one_box(tiny, tmp_path):
+def test_ranks_share_the_seeds_or_one_box(tiny: Path, tmp_path: Path) -> None:
     """mpirun -n 2: two seeds side by side give bit for bit the serial result; one seed over two ranks agrees at
     first (round-off grows in a granular bed) and runs to the end, drag and frit included."""
     short = ["--set", "run.cycles=1", "--set", "run.discard=0"]
@@ -123,7 +124,7 @@ def test_ranks_share_the_seeds_or_one_box(tiny, tmp_path):
     assert np.isfinite(state(shared)["velocity"]).all() and len(state(shared)["velocity"]) == 64
 
 
-def measured(tmp_path, name, **overrides):
+def measured(tmp_path: Path, name: str, **overrides: Any) -> tuple[float, dict[str, np.ndarray]]:
     """Mean velocity and records of one seed."""
     from mpm.dem.simulate import Simulation
 
@@ -132,11 +133,12 @@ def measured(tmp_path, name, **overrides):
         "run.updates_per_cycle": 128, "run.samples_per_cycle": 64, "run.cycles": 3, "run.discard": 1, **overrides,
     })  # fmt: skip
     arrays = Simulation(case, 1, tmp_path / name).run()
+    assert arrays is not None
     return float(arrays["velocity"][64:, 0].mean()), arrays
 
 
 @pytest.mark.lammps
-def test_a_declined_bed_flows_faster(tmp_path):
+def test_a_declined_bed_flows_faster(tmp_path: Path) -> None:
     """Nine degrees down add velocity (section 4.4.3); fails if gravity is turned the wrong way."""
     level, _ = measured(tmp_path, "level", **{"waveform.gamma": 0.7})
     down, _ = measured(tmp_path, "down", **{"waveform.gamma": 0.7, "box.declination": "9 deg"})
@@ -145,7 +147,7 @@ def test_a_declined_bed_flows_faster(tmp_path):
 
 
 @pytest.mark.lammps
-def test_gas_at_rest_in_the_lab_lifts_a_fine_bed(tmp_path):
+def test_gas_at_rest_in_the_lab_lifts_a_fine_bed(tmp_path: Path) -> None:
     """GL56 at Gamma 0.30 over a frit has no flight without gas and flies in air at rest."""
     common = {
         "powder": "GL56", "waveform": {"kind": "sine", "gamma": 0.3, "frequency": "16 Hz"}, "box.size_classes": 1,
@@ -158,7 +160,7 @@ def test_gas_at_rest_in_the_lab_lifts_a_fine_bed(tmp_path):
 
 
 @pytest.mark.lammps
-def test_a_baffle_holds_the_bed(tmp_path):
+def test_a_baffle_holds_the_bed(tmp_path: Path) -> None:
     """Two sizes of coarse glass over a small sawtooth: none falls through the glued layer, the bed slows down."""
     common = {
         "powder": "GL223", "waveform": {"kind": "sine", "gamma": 0.5, "frequency": "16 Hz", "angle_from": "vertical"},
@@ -173,7 +175,9 @@ def test_a_baffle_holds_the_bed(tmp_path):
 
 @pytest.mark.lammps
 @pytest.mark.parametrize("setting", ["box.steps_per_collision=1", "box.stiffness='1e-4 N/m'"])
-def test_an_exploding_box_ends_with_status_3_and_its_cause(tiny, tmp_path, capfd, setting):
+def test_an_exploding_box_ends_with_status_3_and_its_cause(
+    tiny: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], setting: str
+) -> None:
     """An unstable time step and a spring that cannot carry the bed: one line, with what to change."""
     out = tmp_path / "o"
     assert main(["dem", str(tiny), "-o", str(out), "-q", "-j", "2", "--set", setting]) == 3
@@ -183,7 +187,7 @@ def test_an_exploding_box_ends_with_status_3_and_its_cause(tiny, tmp_path, capfd
     assert not (out / "summary.json").exists()
 
 
-def test_without_lammps_it_says_how_to_get_it(tiny, tmp_path):
+def test_without_lammps_it_says_how_to_get_it(tiny: Path, tmp_path: Path) -> None:
     code = (
         "import sys; sys.modules['lammps'] = None; from mpm.cli import main; "
         f"sys.exit(main(['dem', {str(tiny)!r}, '-o', {str(tmp_path / 'o')!r}]))"
@@ -194,7 +198,9 @@ def test_without_lammps_it_says_how_to_get_it(tiny, tmp_path):
 
 
 @pytest.mark.lammps
-def test_a_run_says_that_it_settles_and_what_came_out(tiny, tmp_path, monkeypatch, capfd):
+def test_a_run_says_that_it_settles_and_what_came_out(
+    tiny: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     """Fails when the minutes before the first cycle look like a standstill, or a number of the result has no unit and is no ratio."""
     monkeypatch.setattr("mpm.dem.screen.BETWEEN", 0.0)
     command = ["dem", str(tiny), "-o", str(tmp_path / "o"), "-j", "1", "--set", "run.seeds=1"]
@@ -222,7 +228,14 @@ def test_a_run_says_that_it_settles_and_what_came_out(tiny, tmp_path, monkeypatc
         (["waveform", "none.csv"], "none.csv"),
     ],
 )
-def test_bad_input_ends_with_status_2_in_one_line(tiny, tmp_path, monkeypatch, capfd, arguments, says):
+def test_bad_input_ends_with_status_2_in_one_line(
+    tiny: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    arguments: list[str],
+    says: str,
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["dem", *arguments]) == 2
     error = capfd.readouterr().err
@@ -230,7 +243,7 @@ def test_bad_input_ends_with_status_2_in_one_line(tiny, tmp_path, monkeypatch, c
     assert not (tmp_path / "results").exists()
 
 
-def test_waveform_command(tmp_path, capfd):
+def test_waveform_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """Accelerometer data in, a section for a powder file out: the file reads back to the same motion."""
     t = np.arange(4096) / 1600.0
     a = np.column_stack(
@@ -247,7 +260,7 @@ def test_waveform_command(tmp_path, capfd):
 
 
 @pytest.mark.lammps
-def test_interrupted_run_goes_on(tiny, tmp_path):
+def test_interrupted_run_goes_on(tiny: Path, tmp_path: Path) -> None:
     """SIGINT while two seeds run side by side: status 130, no child left, and --resume ends the run."""
     out = tmp_path / "out"
     command = [
@@ -272,7 +285,7 @@ def test_interrupted_run_goes_on(tiny, tmp_path):
     children = psutil.Process(long.pid).children(recursive=True)
     long.send_signal(signal.SIGINT)
     assert long.wait(timeout=60) == 130
-    assert "--resume" in long.stderr.read()
+    assert long.stderr is not None and "--resume" in long.stderr.read()
     assert psutil.wait_procs(children, timeout=10)[1] == []
     assert not (out / "summary.json").exists()
     done = int(max(state(out, s)["cycles"] for s in (1, 2)))
@@ -301,7 +314,7 @@ Path(sys.argv[1]).with_name("message").write_text(json.dumps(messages.get()))
 
 
 @pytest.mark.parametrize("how", ["exception", "segfault"])
-def test_a_seed_that_crashes_leaves_its_last_words(tiny, how):
+def test_a_seed_that_crashes_leaves_its_last_words(tiny: Path, how: str) -> None:
     """Fails when the cause of a crash in a process of its own is missing in its log or in the line that tells of it."""
     done = subprocess.run([sys.executable, "-c", CRASH, str(tiny), how], capture_output=True, text=True)
     log = process_log(tiny.parent, 1)
@@ -319,7 +332,7 @@ def test_a_seed_that_crashes_leaves_its_last_words(tiny, how):
         assert "Traceback" in text
 
 
-def test_how_a_process_ended_is_said_in_words(tmp_path):
+def test_how_a_process_ended_is_said_in_words(tmp_path: Path) -> None:
     """Fails when an exit code or a signal is not told, or a log without text is quoted."""
     assert (
         last_words(tmp_path / "none", -9)

@@ -1,6 +1,8 @@
 """Waveforms and accelerometer fits: exact shapes and known signals; no LAMMPS."""
 
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from mpm.dem.accelerometer import fit_channel, fit_record, read_record, spectrum
 from mpm.errors import InputError
 
 
-def derivative(values, t):
+def derivative(values: np.ndarray, t: np.ndarray) -> np.ndarray:
     return np.gradient(values, t, axis=1)[:, 1:-1]
 
 
@@ -19,7 +21,7 @@ def derivative(values, t):
     [wf.sine(0.3, 16.0, math.pi / 3), wf.seed_table_2_2(), wf.Sawtooth(113e-6, 80e-6, 48.0)],
     ids=["sine", "table 2.2", "sawtooth"],
 )
-def test_velocity_and_acceleration_are_derivatives(wave):
+def test_velocity_and_acceleration_are_derivatives(wave: Any) -> None:
     """Fails if displacement, velocity and acceleration do not belong to one motion."""
     t = np.linspace(0.0, 1.0 / wave.frequency, 20001)
     v, a = wave.velocity(t), wave.acceleration(t)
@@ -28,7 +30,7 @@ def test_velocity_and_acceleration_are_derivatives(wave):
     assert np.sort(error)[:-6].max() < 1e-3 * np.abs(a).max()  # the sawtooth's acceleration jumps twice
 
 
-def test_sine_follows_the_conventions_of_the_reactor():
+def test_sine_follows_the_conventions_of_the_reactor() -> None:
     """Gamma 0.30, 16 Hz, 60 deg from the horizontal: A_x 0.168 mm, A_y 0.291 mm, displacement A sin(phase)."""
     wave = wf.sine(0.30, 16.0, math.radians(60))
     phase = np.linspace(0, 2 * np.pi, 50)
@@ -39,7 +41,7 @@ def test_sine_follows_the_conventions_of_the_reactor():
     assert wf.peak_displacement(other)[0] / wf.peak_displacement(other)[1] == pytest.approx(math.sqrt(3))
 
 
-def test_sawtooth_satisfies_its_constraints():
+def test_sawtooth_satisfies_its_constraints() -> None:
     """(2-10), (2-11): equal displacement, continuous velocity, 3/4 of the cycle out; 2.27 cm/s out at 113 um."""
     saw = wf.Sawtooth(113e-6, 113e-6, 48.0)
     assert 1 / saw.extension_frequency + 1 / saw.retraction_frequency == pytest.approx(2 / 48.0)
@@ -52,7 +54,7 @@ def test_sawtooth_satisfies_its_constraints():
     assert saw.displacement(np.zeros(1)) == pytest.approx(0.0) and saw.velocity(np.zeros(1))[1] > 0
 
 
-def test_seed_waveform_limits():
+def test_seed_waveform_limits() -> None:
     """Straight drop 1.08 cm/s and perfect flight 3.51 cm/s of section 2.4.2, and the alignment."""
     wave = wf.seed_table_2_2()
     first = wf.HarmonicWaveform(wave.horizontal[:1], wave.vertical[:1], 48.0)
@@ -62,7 +64,7 @@ def test_seed_waveform_limits():
     assert (first.velocity(np.zeros(1)) > 0).all()
 
 
-def test_table_reproduces_a_waveform_from_uneven_samples():
+def test_table_reproduces_a_waveform_from_uneven_samples() -> None:
     """Fails if the resampling, the signs or the alignment of a tabulated period are wrong."""
     wave = wf.HarmonicWaveform(
         (wf.Harmonic(3.0, 20.0), wf.Harmonic(1.0, 60.0, 0.4)), (wf.Harmonic(5.0, 20.0),), 20.0
@@ -76,7 +78,7 @@ def test_table_reproduces_a_waveform_from_uneven_samples():
     assert table.displacement(probe) == pytest.approx(wave.displacement(probe), abs=1e-7)
 
 
-def noisy_record(path, unit=1.0):
+def noisy_record(path: Path, unit: float = 1.0) -> wf.HarmonicWaveform:
     """A synthetic accelerometer: table 2.2's harmonics, uneven 1.6 kHz sampling, gravity offset and noise."""
     rng = np.random.default_rng(7)
     t = np.cumsum(rng.normal(1 / 1600, 2e-5, 3000))
@@ -86,7 +88,7 @@ def noisy_record(path, unit=1.0):
     return wave
 
 
-def test_accelerometer_fit_recovers_the_harmonics(tmp_path):
+def test_accelerometer_fit_recovers_the_harmonics(tmp_path: Path) -> None:
     """Amplitudes to 2 %, frequencies to 0.02 Hz; the raw FFT amplitude is too small and is corrected."""
     wave = noisy_record(tmp_path / "data.csv")
     record = read_record(tmp_path / "data.csv")
@@ -108,7 +110,7 @@ def test_accelerometer_fit_recovers_the_harmonics(tmp_path):
     assert along.harmonics[0].amplitude == pytest.approx(10.581, rel=0.01)
 
 
-def test_units_of_g(tmp_path):
+def test_units_of_g(tmp_path: Path) -> None:
     noisy_record(tmp_path / "g.csv", unit=9.81)
     record = read_record(tmp_path / "g.csv", "g")
     assert fit_channel(record.t, record.acceleration[0], 1).harmonics[0].amplitude == pytest.approx(
@@ -116,7 +118,7 @@ def test_units_of_g(tmp_path):
     )
 
 
-def test_spectrum_of_a_sine_on_a_bin():
+def test_spectrum_of_a_sine_on_a_bin() -> None:
     n = 1024
     f, a = spectrum(1e-3, 2.5 * np.sin(2 * np.pi * 125.0 * np.arange(n) * 1e-3))
     assert f[np.argmax(a)] == pytest.approx(125.0) and a.max() == pytest.approx(2.5, rel=1e-3)
@@ -132,7 +134,7 @@ def test_spectrum_of_a_sine_on_a_bin():
         ("t,a,b\n" + "".join(f"{i},1,nan\n" for i in range(40)), "finite"),
     ],
 )
-def test_bad_records_are_refused_in_one_line(tmp_path, text, message):
+def test_bad_records_are_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "bad.csv"
     path.write_text(text)
     with pytest.raises(InputError, match=message) as info:
@@ -140,7 +142,9 @@ def test_bad_records_are_refused_in_one_line(tmp_path, text, message):
     assert "\n" not in str(info.value) and "bad.csv" in str(info.value)
 
 
-def written(path, columns, separator=",", comma=False, header="t,a,b\n"):
+def written(
+    path: Path, columns: np.ndarray, separator: str = ",", comma: bool = False, header: str = "t,a,b\n"
+) -> Path:
     """A record of 48 Hz with these columns' texts; decimal commas on request."""
     rows = [separator.join(f"{value:.6f}" for value in row) for row in columns.T]
     text = "\n".join(rows)
@@ -149,14 +153,16 @@ def written(path, columns, separator=",", comma=False, header="t,a,b\n"):
 
 
 @pytest.fixture
-def columns():
+def columns() -> np.ndarray:
     t = np.arange(400) / 4000.0
     return np.array([t, 3.0 * np.cos(2 * np.pi * 48 * t), 5.5 * np.sin(2 * np.pi * 48 * t)])
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
 @pytest.mark.parametrize("comma", [False, True])
-def test_decimal_commas_are_read_or_refused(tmp_path, columns, separator, comma):
+def test_decimal_commas_are_read_or_refused(
+    tmp_path: Path, columns: np.ndarray, separator: str, comma: bool
+) -> None:
     """Fails when a decimal comma is taken for a separator, so that times or accelerations are wrong by powers of ten."""
     path = written(tmp_path / "r.csv", columns, separator, comma, separator.join("tab") + "\n")
     if comma and separator == ",":
@@ -173,7 +179,7 @@ def test_decimal_commas_are_read_or_refused(tmp_path, columns, separator, comma)
     )
 
 
-def test_quoted_and_mixed_decimal_marks(tmp_path, columns):
+def test_quoted_and_mixed_decimal_marks(tmp_path: Path, columns: np.ndarray) -> None:
     """Fails when quoted decimal commas are not read, or commas of thousands beside decimal points are read as decimals."""
     path = tmp_path / "r.csv"
     rows = [",".join('"' + f"{value:.6f}".replace(".", ",") + '"' for value in row) for row in columns.T]
@@ -188,7 +194,7 @@ def test_quoted_and_mixed_decimal_marks(tmp_path, columns):
         read_record(path)
 
 
-def test_units_of_a_header_hold(tmp_path, columns):
+def test_units_of_a_header_hold(tmp_path: Path, columns: np.ndarray) -> None:
     """Fails when milliseconds are read as seconds, or a header that contradicts the unit given is passed over."""
     scaled = columns * np.array([[1e3], [1.0], [1.0]])
     record = read_record(written(tmp_path / "r.csv", scaled, header="time (ms),a_y,a_z\n"))

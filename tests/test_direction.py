@@ -99,7 +99,8 @@ def test_solids_leave_at_the_left(tmp_path: Path) -> None:
 def test_long_time_limit_of_averaged(tmp_path: Path) -> None:
     """Fails when the mean coverage of a bed that moves to the left is more than 0.002 from where an averaged run on the same mesh ends
     (see the test of this name in test_steady.py)."""
-    site, changes = "OAl(CH3)2", {TMA: 2e-4}
+    site = "OAl(CH3)2"
+    changes: dict[str, Any] = {TMA: 2e-4}
     _, steady = run(conveyed(zone({**changes, **STEADY}), -0.05, tmp_path))
     leaving = steady.coverage("bed", site)
     entering = np.concatenate([leaving[:, 1:], np.zeros((len(leaving), 1))], axis=1)

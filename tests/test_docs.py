@@ -139,7 +139,7 @@ def test_settings_of_the_list_of_differences() -> None:
 
 def test_figures_of_the_list_of_differences() -> None:
     """Fails when an excess number or a mesh of docs/source.md is no longer what `mpm check` prints."""
-    changed = {
+    changed: dict[float, dict[str, Any]] = {
         1.79: {},
         8.96: {"geometry.inlet.tma.mass_fractions.TMA": 1e-3},
         1.48: {"gas.pressure": "626 torr"},

@@ -2,6 +2,7 @@
 
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -215,7 +216,7 @@ def test_built_in_powders_and_sweeps_are_found_by_name() -> None:
 
 
 @pytest.mark.parametrize("key", all_keys(), ids=lambda key: key.name)
-def test_every_key_is_explained(key, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_key_is_explained(key: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", key.name]) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert key.name in out and key.description in out
@@ -223,7 +224,7 @@ def test_every_key_is_explained(key, capsys: pytest.CaptureFixture[str]) -> None
 
 
 @pytest.mark.parametrize("number", QUANTITIES, ids=lambda number: number.name)
-def test_every_reported_number_is_explained(number, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_reported_number_is_explained(number: Any, capsys: pytest.CaptureFixture[str]) -> None:
     name = number.name.replace("<inlet>", "tma")
     assert main(["explain", name]) == 0
     out = " ".join(capsys.readouterr().out.split())

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -58,21 +59,25 @@ def test_a_field_of_choice(zone: Run, tmp_path: Path) -> None:
     assert words.count("t = 1 s") == 5
 
 
+def frames(film: Any) -> int:
+    return int(film.n_frames)
+
+
 def test_a_movie_has_all_times_and_one_scale(zone: Run) -> None:
     """Fails when a stored time is missing, the picture does not change, or the colours of a value change with time."""
     (path,), words = said(zone, movie=True, field="x_TMA", clim=(1e-6, 1e-4))
     with Image.open(path) as film:
-        assert film.n_frames == 1 or film.n_frames == 5  # equal pictures may be joined
+        assert frames(film) in (1, 5)  # equal pictures may be joined
     (path,), words = said(zone, movie=True)
     assert path.name == "theta_OAl(CH3)2.gif" and words.endswith("movie of 5 stored times from 0 to 2 s")
     with Image.open(path) as film:
-        assert film.n_frames == 5
+        assert frames(film) == 5
     everything = [zone.snapshot(k) for k in range(5)]
     limits = limits_of(zone, everything, "theta_OH")
-    film = Map(zone, "theta_OH", limits)
+    moving = Map(zone, "theta_OH", limits)
     shown = []
     for snapshot in everything:
-        (mesh,) = meshes(film.show(snapshot).axes[0])
+        (mesh,) = meshes(moving.show(snapshot).axes[0])
         shown.append((drawn(mesh).mean(), mesh.get_clim()))
     assert len({value for value, _ in shown}) == 5 and {clim for _, clim in shown} == {(0.0, 1.0)}
 

@@ -102,7 +102,7 @@ def test_dose_ratio_of_water_counts_three_molecules_for_two_sites() -> None:
     found = {i.name: inlet_excess(cycle, i) for i in cycle.geometry.inlets}
     assert found["purge1"] is None and found["purge2"] is None
     tma, water = found["tma"], found["water"]
-    assert tma is not None and water is not None
+    assert tma is not None and water is not None and tma[2] is not None and water[2] is not None
     assert water[1] / water[2] == 1.5
     assert water[2] == pytest.approx(tma[2], rel=1e-3)  # the stoichiometric pair
 
@@ -197,7 +197,9 @@ def test_numerical_diffusion(case: Case) -> None:
     """(Pe/2) coth(Pe/2) - 1 at the bed's and the reactor's speed: small in the zone's columns, Pe^2/12, and steeper in wider ones."""
     fine = case.with_({"fidelity": "resolved"})
     speed = 0.013 + 0.168e-3 * 2.0 * math.pi * 16.0
-    pe = speed * case.geometry.moving_layer.material.tortuosity_factor[0] * 0.34e-3 / 2.88e-5
+    bed = case.geometry.moving_layer
+    assert bed is not None and bed.material is not None
+    pe = speed * bed.material.tortuosity_factor[0] * 0.34e-3 / 2.88e-5
     grid = Grid.from_case(fine)
     assert eng.numerical_diffusion(fine, grid) == pytest.approx(pe**2 / 12.0, rel=0.01)
     assert eng.numerical_diffusion(case, grid) < 0.25 * eng.numerical_diffusion(fine, grid)

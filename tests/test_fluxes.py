@@ -40,12 +40,12 @@ def test_bernoulli_function() -> None:
     for z in (1e-12, 1e-6, 0.999e-3, 1.001e-3, 0.1, 1.0, 30.0, 600.0):
         for value in (z, -z):
             exact = float(sp.N(sp.Rational(value) / (sp.exp(sp.Rational(value)) - 1), 30))
-            assert float(bernoulli(value)) == pytest.approx(exact, rel=1e-12), value
+            assert float(bernoulli(np.array(value))) == pytest.approx(exact, rel=1e-12), value
     with np.errstate(over="raise", invalid="raise", divide="raise"):
         assert bernoulli(np.array([0.0, 1e6, 1e300])).tolist() == pytest.approx([1.0, 0.0, 0.0], abs=1e-290)
-        assert bernoulli(-1e6) == pytest.approx(1e6)
-    z = np.linspace(-40.0, 40.0, 801)
-    np.testing.assert_allclose(bernoulli(-z), bernoulli(z) + z, rtol=1e-12, atol=1e-13)
+        assert bernoulli(np.array(-1e6)) == pytest.approx(1e6)
+    both = np.linspace(-40.0, 40.0, 801)
+    np.testing.assert_allclose(bernoulli(-both), bernoulli(both) + both, rtol=1e-12, atol=1e-13)
 
 
 def test_flux_limits() -> None:

@@ -182,9 +182,8 @@ def test_conveyed_solids(rng: np.random.Generator, alumina: Mechanism, kind: str
             for sign in (1.0, -1.0):
                 moved = values.copy()
                 moved[j] += sign * h
-                ends.append(
-                    kinetics.conveyed(*((moved, theta) if name == "c" else (concentration, moved)), time)
-                )
+                gas, sites = (moved, theta) if name == "c" else (concentration, moved)
+                ends.append(kinetics.conveyed(gas, sites, time))
             for what, slope in zip(("rates", "out"), slopes, strict=True):
                 difference = (getattr(ends[0], what) - getattr(ends[1], what)) / (2 * h)
                 size = np.abs(getattr(passed, what)).max() / values[j].mean()

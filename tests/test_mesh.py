@@ -7,6 +7,7 @@ import meshio
 import numpy as np
 import pytest
 
+from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.mesh.grid import Grid
 from mpm.mesh.msh import build_mesh, read_msh, write_msh
@@ -50,7 +51,7 @@ def test_what_a_case_accepts_can_be_meshed(height: str, grading: float, rows: in
 
 
 @pytest.mark.parametrize("case", [zone(), cycle(), zone(mesh=GRADED)], ids=["zone", "cycle", "graded"])
-def test_ports_are_named_groups(case) -> None:
+def test_ports_are_named_groups(case: Case) -> None:
     """Fails when the group of a port misses a facet that the port covers in part, or holds one it does not touch."""
     grid, quads = Grid.from_case(case), build_mesh(case)
     for port in (*case.geometry.inlets, *case.geometry.outlets):

@@ -115,9 +115,9 @@ def test_paths_of_settings_are_relative_to_where_the_user_stands(folder: Path) -
             ]
         ),
     )
-    for case, speed, length, mass in ((plain, 0.02, 0.1397, 72.07e-3), (typed, 0.05, 0.15, 72.08e-3)):
-        assert case.motion.table is not None and max(case.motion.table.velocity) == speed
-        assert case.geometry.length == length
+    for case, fastest, long, mass in ((plain, 0.02, 0.1397, 72.07e-3), (typed, 0.05, 0.15, 72.08e-3)):
+        assert case.motion.table is not None and max(case.motion.table.velocity) == fastest
+        assert case.geometry.length == long
         assert case.mechanism.get("TMA").molar_mass == mass
     assert parse_settings(["motion.profile=thesis", "geometry.base=single_zone", "chemistry.mechanism=alumina"]) == {
         "motion.profile": "thesis", "geometry.base": "single_zone", "chemistry.mechanism": "alumina",

@@ -101,7 +101,7 @@ def test_what_cannot_be_reached_is_said() -> None:
         optimise(zone(mesh=TINY), target=1.5)
     for option in ({"weight": -1.0}, {"weight": math.nan}, {"limit": 0}, {"target": math.nan}):
         with pytest.raises(InputError, match=f"--{next(iter(option))}: found"):
-            optimise(zone(mesh=TINY), **option)  # type: ignore[arg-type]
+            optimise(zone(mesh=TINY), **option)
     crowded = zone(
         {"material.glass_beads.site_density": "1.4e-5 mol/m^2"}, TINY
     )  # more sites than the richest feed titrates

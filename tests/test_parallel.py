@@ -92,8 +92,8 @@ def test_errors_on_the_first_rank_reach_all(tmp_path: Path) -> None:
 
 def test_gathers_of_uneven_and_empty_shares() -> None:
     """Fails when a rank without values, or with all of them, breaks a gather."""
-    mine = np.arange(5) if COMM.rank == 0 else np.empty(0, np.int64)
-    scatter = Scatter(COMM, mine, 5)
+    mine = np.arange(5.0) if COMM.rank == 0 else np.empty(0)
+    scatter = Scatter(COMM, mine.astype(np.int64), 5)
     np.testing.assert_array_equal(scatter.to_all(10.0 * mine), 10.0 * np.arange(5))
     both = scatter.to_all(np.stack([1.0 * mine, -1.0 * mine]))
     np.testing.assert_array_equal(both, [np.arange(5), -np.arange(5)])

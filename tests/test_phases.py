@@ -52,7 +52,11 @@ def assert_same_phases(one: Path, other: Path, tolerance: float = 0.0) -> None:
         for name, values in mine.cell_data.items():
             scale = float(np.abs(values).max(initial=0.0))
             np.testing.assert_allclose(
-                yours.cell_data[name], values, rtol=0.0, atol=tolerance * scale, err_msg=name
+                np.asarray(yours.cell_data[name], float),
+                np.asarray(values, float),
+                rtol=0.0,
+                atol=tolerance * scale,
+                err_msg=name,
             )
 
 
@@ -82,7 +86,7 @@ def test_last_cycle_is_written_phase_by_phase(tmp_path: Path) -> None:
         assert round(phase / (2.0 * np.pi) * 8) % 8 == int(file[-10:-4])
     mean = np.mean([snapshot.points for snapshot in found], axis=0)
     np.testing.assert_allclose(mean[0, :2], [grid.x[0], grid.y[0]], atol=1e-12)
-    upwards = [snapshot.cell_data["velocity"][:, 0] for snapshot in found]
+    upwards = [np.asarray(snapshot.cell_data["velocity"][:, 0], float) for snapshot in found]
     assert all(np.abs(a - b).max() > 1e-4 for i, a in enumerate(upwards) for b in upwards[:i]), (
         "two phases are alike"
     )

@@ -23,7 +23,7 @@ def test_units_for_people_are_the_same_dimension() -> None:
     """Fails when a unit to be shown does not convert to the SI unit of the number."""
     assert [q.name for q in QUANTITIES if not q.factor > 0.0] == []
     height = quantity("front.tma.height")
-    assert (height.of(-0.0033), height.unit_shown) == (pytest.approx(-3.3), "mm")
+    assert height.of(-0.0033) == pytest.approx(-3.3) and height.unit_shown == "mm"
 
 
 def test_a_steady_state_counts_amounts_per_second() -> None:

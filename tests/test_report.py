@@ -88,7 +88,7 @@ def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
 class Page:
     """A page in a browser, with what it complained of."""
 
-    def __init__(self, browser: Any, path: Path):
+    def __init__(self, browser: Any, path: Path) -> None:
         self.page = browser.new_page(viewport={"width": 1300, "height": 900})
         self.complaints: list[str] = []
         self.requests: list[str] = []

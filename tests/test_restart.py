@@ -101,7 +101,8 @@ def test_restart_state_is_complete_on_several_ranks(mode: str, tmp_path: Path) -
         directory.release()
 
     on_root(COMM, prepare)
-    reactor, written = Reactor(case, COMM), []
+    reactor = Reactor(case, COMM)
+    written: list[float] = []
 
     def write(r: Reactor) -> None:
         if r.time > 0.11 and not written:

@@ -36,7 +36,7 @@ values = [1e-4, 2e-4]
 class Terminal(io.TextIOWrapper):
     """Standard output that says it is a terminal."""
 
-    def __init__(self, is_terminal: bool):
+    def __init__(self, is_terminal: bool) -> None:
         super().__init__(io.BytesIO(), encoding="utf-8", write_through=True)
         self.is_terminal = is_terminal
 

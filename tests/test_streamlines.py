@@ -1,6 +1,7 @@
 """The stream function gives back the flow it is made from."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,12 +53,12 @@ def through_ports(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("flow", [uniform, channel, loop, through_ports])
 @pytest.mark.parametrize("cell_width", ["3 mm", "3.1 mm"])
 @pytest.mark.parametrize("stored", [np.float64, np.float32])
-def test_stream_function_is_that_of_the_flow(flow, cell_width: str, stored: type) -> None:
+def test_stream_function_is_that_of_the_flow(flow: Any, cell_width: str, stored: type) -> None:
     """Fails when a sign, a row height or the constant between neighbouring corners is wrong (for even and odd numbers of columns)."""
     strip = grid(**{"geometry.cell_width": cell_width})
     exact = flow(strip.x[None, :], strip.y[:, None])
     exact = exact - exact[0, 0]
-    given = velocities(strip, exact).astype(stored)
+    given: np.ndarray = velocities(strip, exact).astype(stored)
     for shaped in (given, given.reshape(-1, 2), np.pad(given.reshape(-1, 2), ((0, 0), (0, 1)))):
         psi = stream_function(strip, shaped)
         assert psi.shape == (strip.rows + 1, strip.columns + 1) and psi[0, 0] == 0.0

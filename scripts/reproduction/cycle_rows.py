@@ -47,7 +47,7 @@ def steady_cycle(lab: Lab, width: str, changes: dict[str, Any] | None = None) ->
 def dose_ratios(case: Case) -> dict[str, float]:
     """Excess number over what saturation needs, per dosing inlet."""
     found = {i.name: inlet_excess(case, i) for i in case.geometry.inlets}
-    return {name: e[2] for name, e in found.items() if e is not None}
+    return {name: e[2] for name, e in found.items() if e is not None and e[2] is not None}
 
 
 @row(
@@ -57,7 +57,7 @@ def dose_ratios(case: Case) -> dict[str, float]:
     "within 5 % from 30 to 60 s",
 )
 def similar_boxes(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for width in WIDTHS:
         run = lab.run(cycle_case(lab, width))
         tma, water = (column(run, f"titration.{name}.box_mean", 30.0, 60.4) for name in ("tma", "water"))
@@ -108,7 +108,7 @@ def similar_boxes(lab: Lab) -> Finding:
     "largest over final value > 1.01 against <= 1.01",
 )
 def overshoot(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for width in WIDTHS:
         run = lab.run(cycle_case(lab, width))
         ratios = {}
@@ -135,7 +135,7 @@ def overshoot(lab: Lab) -> Finding:
     "shift at most one port width",
 )
 def alike(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for width in WIDTHS:
         run = lab.run(cycle_case(lab, width))
         places = {name: bed_front(run, name) for name in ("tma", "water")}
@@ -161,7 +161,7 @@ def alike(lab: Lab) -> Finding:
 
 @row("R19", "5.14b", "CVD lies in the TMA zone", "more than 50 % of the integral in zone 1 at 60.4 s")
 def cvd_place(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for width in WIDTHS:
         run = lab.run(cycle_case(lab, width))
         cvd = run.summary["cvd"]
@@ -189,9 +189,9 @@ def cvd_place(lab: Lab) -> Finding:
     "at least 10 times; peak over final value above 1.1 without and at most 1.1 with the delay",
 )
 def cvd_rates(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for width in WIDTHS:
-        runs = {"stoichiometric": {}, "rich": RICH, "delayed": DELAY}
+        runs: dict[str, dict[str, Any]] = {"stoichiometric": {}, "rich": RICH, "delayed": DELAY}
         rates = {
             name: column(lab.run(cycle_case(lab, width, changes)), "cvd.rate_mean")
             for name, changes in runs.items()
@@ -227,7 +227,7 @@ def cvd_rates(lab: Lab) -> Finding:
     "box means within 0.05 from 30 s on",
 )
 def delay_harmless(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for width in WIDTHS:
         with_, without = (
             column(lab.run(cycle_case(lab, width, changes)), "titration.water.box_mean", 30.0)
@@ -257,7 +257,7 @@ RATIOS = (0.5, 1.0, 2.0)
     "over a map of both doses the CVD is least where both dose ratios are 1",
 )
 def cvd_map(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     ratios = RATIOS
     for width in WIDTHS:
         base = dose_ratios(lab.case("cycle", "coarse", {**ports(width), **STOICHIOMETRIC}))
@@ -276,8 +276,8 @@ def cvd_map(lab: Lab) -> Finding:
             ("rate per film", rate / film),
             ("rate over the product of the feeds", rate / feed),
         ):
-            i, j = np.unravel_index(np.argmin(values), values.shape)
-            numbers[width][f"least {name}"] = [ratios[int(i)], ratios[int(j)]]
+            i, j = (int(k) for k in np.unravel_index(np.argmin(values), values.shape))
+            numbers[width][f"least {name}"] = [ratios[i], ratios[j]]
             checks.add(f"{name}, ports {width}", (i, j) == (one, one))
         numbers[width]["rate at 1, 1"], numbers[width]["rate at 2, 2"] = (
             rate[one, one],

@@ -48,7 +48,7 @@ def before_vibration(lab: Lab) -> Finding:
     case = resolved(lab, mesh="thesis")
     grid = Grid.from_case(case)
     flows = at_rest(lab, case)
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     opening = grid.opening(case.geometry.outlets[0])
     for name, text in (("steady", "steady"), ("after_50ms", "50 ms after the inlets open")):
         field = flows[name]
@@ -72,7 +72,7 @@ def before_vibration(lab: Lab) -> Finding:
     "3.38 to 6.76 cm/s against 3 to 4 cm/s",
 )
 def frame_speed(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for gamma in GAMMAS:
         v = Vibration.from_motion(resolved(lab, mesh="coarse", gamma=gamma).motion)
         vx, vy = v.velocity(0.0)
@@ -111,7 +111,7 @@ def following(ux: Floats, frame: Floats) -> float:
 def left_and_right(lab: Lab) -> Finding:
     from reproduction.flows import cycle
 
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     configurations = [(g, first, True) for g in GAMMAS for first in (None, EARLY)] + [(0.30, None, False)]
     for gamma, first, periodic in configurations:
         case = resolved(lab, gamma=gamma, startup="developed" if first is None else "impulsive")
@@ -256,7 +256,7 @@ def backflow(lab: Lab) -> Finding:
 def fluctuation(lab: Lab) -> Finding:
     from reproduction.flows import cycle
 
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for first, state in ((None, "developed"), (EARLY, "start-up")):
         startup = "developed" if first is None else "impulsive"
         low, high = (cycle(lab, resolved(lab, gamma=g, startup=startup), first)["rms"] for g in GAMMAS)

@@ -119,9 +119,12 @@ def _reduce(
         rms.append(np.sqrt(variance.sum()))
     arrays["rms"] = np.array(rms)
     arrays["inflow"] = sum(
-        whole[:, BOTTOM, 0, grid.overlap(i) > 0.0].sum(axis=1) * grid.dx
-        for i in case.geometry.inlets
-        if i.side == "bottom"
+        (
+            whole[:, BOTTOM, 0, grid.overlap(i) > 0.0].sum(axis=1) * grid.dx
+            for i in case.geometry.inlets
+            if i.side == "bottom"
+        ),
+        start=np.zeros(len(whole)),
     )
     for outlet in case.geometry.outlets:
         arrays[f"out_{outlet.name}"] = whole[:, TOP, -1, grid.opening(outlet)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,7 @@ def knees(time: Floats, values: Floats) -> tuple[float, float]:
     "three segments, knees at 2.5 and 7.5 s within 20 %",
 )
 def three_segments(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     runs = {f"Y {dose:g}": lab.run(dose_case(lab, dose)) for dose in DOSES}
     runs |= {
         f"headspace {height}": lab.run(
@@ -112,7 +114,7 @@ def spike(lab: Lab) -> Finding:
     "unreacted share tends to 1 - 1/gamma, within 0.02 in the steady state",
 )
 def unreacted(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for dose in DOSES[1:]:
         run = lab.run(dose_case(lab, dose))
         _, x = signal(run, LEFT_OVER)

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ SITE = "OAl(CH3)2"
 
 def strip_map(
     panel: Axes, run: Run, values: Floats, norm: Normalize, colours: str, title: str, layer: str | None = None
-) -> object:
+) -> QuadMesh:
     """A field of the strip, or of one layer, stretched in height."""
     grid = run.grid
     rows = grid.layer_rows(layer) if layer else slice(0, grid.rows)

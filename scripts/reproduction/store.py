@@ -48,7 +48,7 @@ class Lab:
         mesh = "coarse" if self.coarse else mesh
         case = load_case(BASES[base], {**MESHES[mesh], **(changes or {})})
         cells = case.geometry.columns * sum(layer.cells for layer in case.geometry.layers)
-        fidelity = case.fidelity
+        fidelity: str = case.fidelity
         if fidelity == "resolved" and case.motion.startup == "impulsive":
             fidelity = "start-up"
         self.used.setdefault(f"{mesh}, {cells:,} cells", set()).add(fidelity)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ def _highest(y: Floats, values: Floats, level: float) -> float:
     "four orderings, each by more than 1 %",
 )
 def vibration_spreads(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for startup, state in (("impulsive", "start-up"), ("developed", "developed")):
         for frame in ("reactor", "lab"):
             runs = [
@@ -124,7 +125,7 @@ def centroid(run: Run, layer: str) -> float:
     "centroid moves to +x in bed and headspace",
 )
 def dragging(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     layers = ("frit", "bed", "headspace")
     for state, changes in (
         ("cycle mean", {}),
@@ -170,7 +171,7 @@ def pulse_case(lab: Lab, mesh: str, startup: str, frame: str, gamma: float) -> C
     "ordering at every output time, by more than the mesh error",
 )
 def box_mean(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
 
     def pulse(mesh: str, startup: str, frame: str, gamma: float) -> Floats:
         return late(lab.run(pulse_case(lab, mesh, startup, frame, gamma)))

@@ -105,7 +105,7 @@ def lean_dose(lab: Lab) -> Finding:
 
 @row("R10", "5.11", "Y 2e-4, 1e-3, 1e-2: full titration at the exit", "exit mean >= 0.99 at 20 s")
 def rich_doses(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for dose in DOSES[1:]:
         run = lab.run(dose_case(lab, dose))
         entry = run.summary["titration"]["tma"]
@@ -129,7 +129,7 @@ def rich_doses(lab: Lab) -> Finding:
     "sticking x 0.1 and x 10 change the exit mean by less than 1 %",
 )
 def supply_limited(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     for dose in (1e-4, 1e-3):
         exits = {}
         for factor in (0.1, 1.0, 10.0):
@@ -165,7 +165,7 @@ VARIATIONS: dict[str, dict[str, Any]] = {
     "at fixed gamma the exit mean of the steady state stays within 5 %",
 )
 def excess_alone(lab: Lab) -> Finding:
-    checks, numbers = Checks(), {}
+    checks, numbers = Checks(), dict[str, Any]()
     base = lab.case("zone", "medium", {DOSE: 1e-4, **lab.settled})
     exit_base = lab.run(base).summary["titration"]["tma"]["exit_mean"]
     numbers["base"] = {"exit_mean": exit_base, "excess": excess(base)}

@@ -7,7 +7,9 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,13 +18,15 @@ from mpm.sweep import cluster
 from mpm.sweep.cluster import PoolLost, Waiting, look_at_queue, slurm_options
 from mpm.sweep.lease import Lease, Watch
 
+from .conftest import Bench
+
 pytest.importorskip("distributed", reason="needs the extra sweep")
 
 SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s")
 
 
 @pytest.fixture
-def dask(bench):
+def dask(bench: Bench) -> Iterator[Any]:
     """`dask(2)`: address of a scheduler on loopback and the processes of that many workers, one point at a time each."""
     processes = []
 
@@ -51,14 +55,14 @@ def dask(bench):
             client.wait_for_workers(workers, timeout=60)
             return client.scheduler.address, started
 
-    cluster.processes = processes
+    setattr(cluster, "processes", processes)  # noqa: B010
     yield cluster
     for process in reversed(processes):
         process.kill()
         process.wait()
 
 
-def test_dask_with_a_killed_worker_gives_the_local_table(bench, dask):
+def test_dask_with_a_killed_worker_gives_the_local_table(bench: Bench, dask: Any) -> None:
     """Fails when a point of the killed worker is lost, a finished one repeated, or the tables differ in a byte."""
     bench.delay = 1.0
     bench.sweep("[0.1, 0.2, 0.3, 0.77]", SPEEDS)
@@ -87,7 +91,7 @@ def test_dask_with_a_killed_worker_gives_the_local_table(bench, dask):
     assert bench.text() == bench.text("local")
 
 
-def test_an_interrupted_dask_sweep_stops_its_points_on_the_workers(bench, dask):
+def test_an_interrupted_dask_sweep_stops_its_points_on_the_workers(bench: Bench, dask: Any) -> None:
     """Fails when workers go on computing for a driver that was stopped, or the next call does not go on."""
     bench.delay = 2.0
     bench.sweep("[0.1, 0.2, 0.3]")
@@ -103,7 +107,7 @@ def test_an_interrupted_dask_sweep_stops_its_points_on_the_workers(bench, dask):
     assert set(bench.names("step").values()) == {20}
 
 
-def test_a_lost_scheduler_ends_the_sweep_with_what_is_finished(bench, dask):
+def test_a_lost_scheduler_ends_the_sweep_with_what_is_finished(bench: Bench, dask: Any) -> None:
     """Fails when the driver waits for ever, shows tracebacks, or the next call starts over."""
     bench.delay = 1.0
     bench.sweep("[0.1, 0.2, 0.3, 0.4]")
@@ -121,7 +125,7 @@ def test_a_lost_scheduler_ends_the_sweep_with_what_is_finished(bench, dask):
     assert set(bench.names("step").values()) == {20}
 
 
-def test_an_address_without_a_scheduler_is_one_line(bench):
+def test_an_address_without_a_scheduler_is_one_line(bench: Bench) -> None:
     """Fails when a wrong address ends in a traceback."""
     bench.sweep("[0.1]")
     status, messages = bench.run(scheduler="tcp://127.0.0.1:1")
@@ -130,7 +134,7 @@ def test_an_address_without_a_scheduler_is_one_line(bench):
     assert "Traceback" not in messages
 
 
-def test_a_port_that_says_nothing_is_no_scheduler(monkeypatch):
+def test_a_port_that_says_nothing_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails when a listener that accepts and never answers, or an address of TLS without keys, holds the driver up."""
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
@@ -139,7 +143,7 @@ def test_a_port_that_says_nothing_is_no_scheduler(monkeypatch):
                 pass
 
 
-def test_a_driver_that_fell_silent_has_left(tmp_path):
+def test_a_driver_that_fell_silent_has_left(tmp_path: Path) -> None:
     """Fails when a point on another machine would outlive its driver, or one with a living driver be stopped."""
     with Lease(tmp_path / "lease") as lease:
         watch = Watch(lease.path, lease.token, expiry=3.0)
@@ -168,7 +172,7 @@ for job in sys.argv[1:]:
 """
 
 
-def slurm(bench, **scripts: str) -> None:
+def slurm(bench: Bench, **scripts: str) -> None:
     """Puts commands of these texts first on the PATH of the bench's drivers."""
     commands, jobs = bench.path / "bin", bench.path / "jobs"
     commands.mkdir()
@@ -191,7 +195,7 @@ def slurm(bench, **scripts: str) -> None:
         ("#!/nowhere/sh\n", "sbatch cannot be started"),
     ],
 )
-def test_jobs_that_slurm_refuses_end_the_sweep(bench, refusing, said):
+def test_jobs_that_slurm_refuses_end_the_sweep(bench: Bench, refusing: Any, said: str) -> None:
     """Fails when the driver waits for jobs that were never taken, shows a traceback, or ends as if all were well."""
     slurm(bench, sbatch=refusing)
     bench.sweep("[0.1]", tail='[sweep.slurm]\nworkers = 2\ninterface = "lo"\n')
@@ -209,7 +213,7 @@ for job in sys.argv[2].partition("=")[2].split(","):
 """
 
 
-def test_jobs_that_end_before_a_worker_connects_end_the_sweep(bench):
+def test_jobs_that_end_before_a_worker_connects_end_the_sweep(bench: Bench) -> None:
     """The jobs find no Python. Fails when the driver waits for workers that no job will start, or does not say where to look."""
     python = sys.executable
     broken = SBATCH.format(python=python).replace(
@@ -223,7 +227,9 @@ def test_jobs_that_end_before_a_worker_connects_end_the_sweep(bench):
     assert Counter(bench.table().status) == {"pending": 1}
 
 
-def test_what_a_waiting_sweep_waits_for_is_said_once(tmp_path, monkeypatch, capsys):
+def test_what_a_waiting_sweep_waits_for_is_said_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Fails when a pending job is not named with Slurm's reason, is named at every look, or a lost queue counts as empty."""
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
 
@@ -247,7 +253,7 @@ def test_what_a_waiting_sweep_waits_for_is_said_once(tmp_path, monkeypatch, caps
         waiting.update(0)
 
 
-def test_slurm_runs_the_sweep_in_its_jobs(bench):
+def test_slurm_runs_the_sweep_in_its_jobs(bench: Bench) -> None:
     """sbatch and scancel are scripts that start and end processes here. Fails when job scripts do not run points."""
     slurm(bench, sbatch=SBATCH.format(python=sys.executable), scancel=SCANCEL.format(python=sys.executable))
     jobs = bench.path / "jobs"
@@ -265,7 +271,7 @@ def test_slurm_runs_the_sweep_in_its_jobs(bench):
     bench.wait_for(lambda: not any(bench.alive(int(file.name)) for file in scripts), 10.0)
 
 
-def test_slurm_options_ask_for_points_times_ranks():
+def test_slurm_options_ask_for_points_times_ranks() -> None:
     """Fails when a job gets fewer processors than its points have ranks, or our own keys reach dask-jobqueue."""
     options = slurm_options({"workers": 3, "points_per_job": 4, "walltime": "01:00:00"}, 2, Path("log"))
     assert (options["cores"], options["job_cpu"], options["processes"]) == (4, 8, 1)
@@ -273,7 +279,7 @@ def test_slurm_options_ask_for_points_times_ranks():
     assert not {"workers", "points_per_job"} & set(options)
 
 
-def test_wrong_slurm_options_are_one_line(bench):
+def test_wrong_slurm_options_are_one_line(bench: Bench) -> None:
     """Fails when an option that dask-jobqueue does not know ends in a traceback."""
     bench.sweep("[0.1]", tail='[sweep.slurm]\nqueu = "short"\n')
     started = time.monotonic()

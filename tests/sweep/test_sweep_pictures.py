@@ -20,13 +20,20 @@ SPEED = Scale("speed [cm/s]", np.tile([1.0, 2.0], 3), (), False)
 VALUES = np.array([1.0, 2.0, 3.0, np.nan, 5.0, 6.0])
 
 
+def drawn(mesh: QuadMesh) -> list[list[float]]:
+    """Values of the cells; -1 where there is none."""
+    values = mesh.get_array()
+    assert values is not None
+    return np.ma.filled(values, -1.0).tolist()
+
+
 def test_cells_show_the_values_of_their_points() -> None:
     """Fails when a cell has another point's value, lines run across cells that say otherwise, or a hatching is not explained."""
     figure = Figure()
     heat_map(figure, DOSE, SPEED, VALUES, "number")
     axes = figure.axes[0]
     (mesh,) = [child for child in axes.get_children() if isinstance(child, QuadMesh)]
-    assert np.ma.filled(mesh.get_array(), -1.0).tolist() == [[1.0, 3.0, 5.0], [2.0, -1.0, 6.0]]
+    assert drawn(mesh) == [[1.0, 3.0, 5.0], [2.0, -1.0, 6.0]]
     written = {(round(x, 6), y): text.get_text() for text in axes.texts for x, y in [text.get_position()]}
     assert len(written) == 5 and written[(4e-4, 1.0)] == "5"
     assert not [child for child in axes.get_children() if isinstance(child, ContourSet)]
@@ -104,14 +111,14 @@ def test_a_sweep_is_drawn_from_its_files(sweep: Path, monkeypatch: pytest.Monkey
     """Fails when a number has no words or unit, axes are not in the unit of the sweep file, or a column without numbers is drawn."""
     kept: list[Figure] = []
     monkeypatch.setattr("mpm.sweep.pictures.write_picture", lambda path, figure, **_: kept.append(figure))
-    drawn = draw(sweep)
-    assert drawn == {
+    files = draw(sweep)
+    assert files == {
         sweep / "plots" / "species.TMA.fed.png": "TMA fed [umol/m/s] over inlet tma velocity, how (profile)"
     }
     axes, bar = kept[0].axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("inlet tma velocity [cm/s]", "how (profile)")
     (mesh,) = [child for child in axes.get_children() if isinstance(child, QuadMesh)]
-    assert np.ma.filled(mesh.get_array(), -1.0).tolist() == pytest.approx(np.array([[1.0, 2.0], [-1.0, 4.0]]))
+    assert drawn(mesh) == pytest.approx(np.array([[1.0, 2.0], [-1.0, 4.0]]))
     assert bar.get_ylabel() == "TMA fed [umol/m/s]" and [t.get_text() for t in axes.get_yticklabels()] == [
         "thesis",
         "phases",

@@ -5,14 +5,15 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from mpm.case.case import load_case
+from mpm.case.case import Case, load_case
 from mpm.errors import InputError
 from mpm.sweep.cluster import slurm_options
 from mpm.sweep.conditions import Condition
-from mpm.sweep.plan import plan
+from mpm.sweep.plan import Point, plan
 from mpm.sweep.quantities import Range, to_number, unit_as_written
 from mpm.sweep.sweepfile import read_sweep
 
@@ -42,14 +43,14 @@ def axis(key: str, values: str, more: str = "") -> str:
         (True, "true", "", ""),
     ],
 )
-def test_values_become_si_numbers_as_in_a_case(value, number, unit, written):
+def test_values_become_si_numbers_as_in_a_case(value: Any, number: Any, unit: str, written: Any) -> None:
     """Fails when a table would show another number than the case computes with, or a wrong unit."""
     found, found_unit = to_number(value)
     assert found == (number if isinstance(number, str) else pytest.approx(number, rel=1e-15))
     assert (found_unit, unit_as_written(value)) == (unit, written)
 
 
-def test_ranges_keep_the_unit_of_their_start_and_short_decimals():
+def test_ranges_keep_the_unit_of_their_start_and_short_decimals() -> None:
     """Fails when refining a range renames its old points (0.30000000000000004) or ends are missed."""
     assert Range("1 mm", "0.5 cm", False).levels(5) == ("1.0 mm", "2.0 mm", "3.0 mm", "4.0 mm", "5.0 mm")
     assert Range(1e-4, 1e-2, True).levels(3) == (1e-4, 1e-3, 1e-2)
@@ -57,7 +58,12 @@ def test_ranges_keep_the_unit_of_their_start_and_short_decimals():
     assert set(coarse) < set(fine)
 
 
-def test_a_grid_runs_through_its_last_axis_first_and_names_points_by_content(tmp_path):
+def case(point: Point) -> Case:
+    assert point.case is not None
+    return point.case
+
+
+def test_a_grid_runs_through_its_last_axis_first_and_names_points_by_content(tmp_path: Path) -> None:
     """Fails when order or overrides are wrong, or a name depends on how a value is written."""
     body = axis(TMA, "values = [1e-4, 2e-4]") + axis(
         "motion.bed_velocity", 'linspace = { start = "0.5 cm/s", stop = "3 cm/s", num = 3 }', 'name = "speed"'
@@ -69,13 +75,13 @@ def test_a_grid_runs_through_its_last_axis_first_and_names_points_by_content(tmp
         (1e-4, 0.03),
         (2e-4, 0.005),
     ]
-    assert [point.case.motion.bed_velocity for point in points][:3] == [0.005, 0.0175, 0.03]
+    assert [case(point).motion.bed_velocity for point in points][:3] == [0.005, 0.0175, 0.03]
     same = load_case("single_zone", {TMA: 2e-4, "motion.bed_velocity": "5 mm/s", "time.end": "3000 ms"})
     assert points[3].name == same.content_hash()[:12]
     assert len({point.name for point in points}) == 6
 
 
-def test_an_axis_without_effect_is_refused(tmp_path):
+def test_an_axis_without_effect_is_refused(tmp_path: Path) -> None:
     """Fails when a sweep over the bed speed runs although a profile file rules: its points would all be one case."""
     rows = "".join(f"{phase},0.01,0,1\n" for phase in range(0, 360, 30))
     (tmp_path / "p.csv").write_text(f"phase_deg,u_x_m/s,u_y_m/s,contact\n{rows}")
@@ -87,38 +93,38 @@ def test_an_axis_without_effect_is_refused(tmp_path):
         plan(read_sweep(sweep_file(tmp_path, body + fixed)))
 
 
-def test_files_are_found_beside_the_sweep(tmp_path):
+def test_files_are_found_beside_the_sweep(tmp_path: Path) -> None:
     """Fails when a profile that the sweep file names, fixed or as levels, is looked for beside the case that it varies."""
     for name, speed in (("a.csv", 0.01), ("b.csv", 0.02)):
         rows = "".join(f"{phase},{speed},0,1\n" for phase in range(0, 360, 30))
         (tmp_path / name).write_text(f"phase_deg,u_x_m/s,u_y_m/s,contact\n{rows}")
     levels = axis("motion.profile", 'values = ["a.csv", "b.csv", "thesis"]', 'name = "how"')
     points = plan(read_sweep(sweep_file(tmp_path, levels)))
-    assert [point.case.motion.mean_velocity for point in points] == pytest.approx([0.01, 0.02, 0.013])
+    assert [case(point).motion.mean_velocity for point in points] == pytest.approx([0.01, 0.02, 0.013])
     assert points[0].levels == ("a.csv",)
     fixed = axis("motion.gamma", "values = [0.3]") + '[sweep.set]\n"motion.profile" = "b.csv"\n'
-    assert plan(read_sweep(sweep_file(tmp_path, fixed)))[0].case.motion.mean_velocity == pytest.approx(0.02)
+    assert case(plan(read_sweep(sweep_file(tmp_path, fixed)))[0]).motion.mean_velocity == pytest.approx(0.02)
 
 
-def test_unquoted_fixed_overrides_are_the_same_as_quoted_ones(tmp_path):
+def test_unquoted_fixed_overrides_are_the_same_as_quoted_ones(tmp_path: Path) -> None:
     """Fails when TOML's nested reading of `time.end = ...` is not taken for the dotted key."""
     body = axis("motion.gamma", "values = [0.3]")
     quoted = plan(read_sweep(sweep_file(tmp_path, body + '[sweep.set]\n"time.end" = "3 s"\n')))
     nested = plan(read_sweep(sweep_file(tmp_path, body + '[sweep.set]\ntime.end = "3 s"\n')))
     assert quoted[0].name == nested[0].name
-    assert nested[0].case.time.end == 3.0
+    assert case(nested[0]).time.end == 3.0
 
 
-def test_one_axis_can_set_several_keys(tmp_path):
+def test_one_axis_can_set_several_keys(tmp_path: Path) -> None:
     """Fails when only the first of the keys follows the axis."""
     body = (
         '[[sweep.axis]]\nname = "width"\nkey = ["geometry.inlet.tma.width", "geometry.inlet.purge.width"]\n'
     )
     (point,) = plan(read_sweep(sweep_file(tmp_path, body + 'values = ["2.2 mm"]\n')))
-    assert {inlet.width for inlet in point.case.geometry.inlets} == {0.0022}
+    assert {inlet.width for inlet in case(point).geometry.inlets} == {0.0022}
 
 
-def test_zip_pairs_the_levels(tmp_path):
+def test_zip_pairs_the_levels(tmp_path: Path) -> None:
     """Fails when zip multiplies axes out, or accepts axes of different length."""
     body = axis("motion.gamma", "values = [0.3, 0.4]") + axis(
         "motion.frequency", 'values = ["16 Hz", "20 Hz"]'
@@ -131,7 +137,7 @@ def test_zip_pairs_the_levels(tmp_path):
 
 
 @pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
-def test_samples_fill_their_ranges_evenly(tmp_path, method):
+def test_samples_fill_their_ranges_evenly(tmp_path: Path, method: str) -> None:
     """Fails when a sixteenth of either axis (a stratum of both methods) holds other than one sample."""
     body = axis(TMA, "logspace = { start = 1e-4, stop = 1e-2 }") + axis(
         "motion.bed_velocity", 'linspace = { start = "0.5 cm/s", stop = "3 cm/s" }'
@@ -144,7 +150,7 @@ def test_samples_fill_their_ranges_evenly(tmp_path, method):
     assert [point.name for point in plan(sweep)] == [point.name for point in points]
 
 
-def test_a_longer_sobol_sample_contains_the_shorter_one(tmp_path):
+def test_a_longer_sobol_sample_contains_the_shorter_one(tmp_path: Path) -> None:
     """Fails when extending a sample would compute its points anew."""
     body = axis("motion.gamma", "linspace = { start = 0.1, stop = 0.6 }")
     names = {
@@ -157,14 +163,14 @@ def test_a_longer_sobol_sample_contains_the_shorter_one(tmp_path):
     assert names[8] < names[12]
 
 
-def test_a_listed_axis_is_sampled_from_its_list(tmp_path):
+def test_a_listed_axis_is_sampled_from_its_list(tmp_path: Path) -> None:
     """Fails when sample mode invents values between listed ones."""
     body = axis("motion.gamma", "values = [0.3, 0.6]")
     points = plan(read_sweep(sweep_file(tmp_path, body, 'mode = "sample"\nsamples = 8')))
     assert sorted({point.numbers[0] for point in points}) == [0.3, 0.6]
 
 
-def test_conditions_drop_combinations(tmp_path):
+def test_conditions_drop_combinations(tmp_path: Path) -> None:
     """Fails when a condition is read in other units than SI or keeps the wrong side."""
     body = axis("geometry.inlet.tma.width", 'values = ["2 mm", "4 mm"]', 'name = "width"') + axis(
         "geometry.layer.bed.height", 'values = ["2 mm", "3 mm", "6 mm"]', 'name = "height"'
@@ -173,7 +179,7 @@ def test_conditions_drop_combinations(tmp_path):
     assert [point.numbers for point in plan(sweep)] == [(0.002, 0.002), (0.002, 0.003)]
 
 
-def test_conditions_evaluate_and_nothing_else():
+def test_conditions_evaluate_and_nothing_else() -> None:
     """Fails when arithmetic is wrong, or an expression could call or reach into anything."""
     assert Condition("0.001 < width <= 2 * height", ("width", "height")).holds(
         {"width": 0.004, "height": 0.002}
@@ -195,7 +201,7 @@ def test_conditions_evaluate_and_nothing_else():
         Condition("widht > 1", ("width", "height"))
 
 
-def test_a_point_that_the_case_refuses_is_in_the_plan_with_its_error(tmp_path):
+def test_a_point_that_the_case_refuses_is_in_the_plan_with_its_error(tmp_path: Path) -> None:
     """Fails when one impossible combination would stop the others, or lose its reason."""
     body = axis("geometry.inlet.tma.center", 'values = ["104.775 mm", "300 mm"]')
     good, bad = plan(read_sweep(sweep_file(tmp_path, body)))
@@ -284,7 +290,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("what", BROKEN)
-def test_a_broken_sweep_file_gives_one_line_that_names_file_and_key(tmp_path, what):
+def test_a_broken_sweep_file_gives_one_line_that_names_file_and_key(tmp_path: Path, what: str) -> None:
     """Fails when the message is missing, has several lines, or does not say where and what."""
     body, head, message = BROKEN[what]
     file = sweep_file(tmp_path, body, head)
@@ -294,7 +300,7 @@ def test_a_broken_sweep_file_gives_one_line_that_names_file_and_key(tmp_path, wh
     assert "\n" not in str(caught.value)
 
 
-def test_a_case_given_as_a_sweep_is_told_apart(tmp_path):
+def test_a_case_given_as_a_sweep_is_told_apart(tmp_path: Path) -> None:
     """Fails when a case file, or no file, ends in a traceback."""
     case = tmp_path / "case.toml"
     case.write_text('title = "a case"\n')
@@ -304,7 +310,7 @@ def test_a_case_given_as_a_sweep_is_told_apart(tmp_path):
         read_sweep(tmp_path / "absent.toml")
 
 
-def test_planning_imports_neither_mpi_nor_the_solver(tmp_path):
+def test_planning_imports_neither_mpi_nor_the_solver(tmp_path: Path) -> None:
     """Fails when the driver could initialise MPI: then its children would be taken for ranks of its job."""
     file = sweep_file(tmp_path, axis("motion.gamma", "values = [0.3]"))
     code = (
@@ -319,18 +325,18 @@ def test_planning_imports_neither_mpi_nor_the_solver(tmp_path):
 @pytest.mark.parametrize(
     "file", sorted(Path(__file__).parents[2].glob("cases/sweeps/*.toml")), ids=lambda file: file.stem
 )
-def test_shipped_sweeps_can_be_planned(file):
+def test_shipped_sweeps_can_be_planned(file: Path) -> None:
     """Fails when a shipped sweep does not fit the shipped cases, or one of its points is refused."""
     assert all(point.case is not None for point in plan(read_sweep(file)))
 
 
-def test_documented_sweep_is_valid(tmp_path):
+def test_documented_sweep_is_valid(tmp_path: Path) -> None:
     """Fails when what docs/sweeps.md prints is refused, or its condition keeps other combinations than it says."""
     text = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
     sweep, slurm = re.findall(r"^```toml\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     (tmp_path / "sweep.toml").write_text(sweep + slurm, encoding="utf-8")
     read = read_sweep(tmp_path / "sweep.toml")
-    kept = [point.numbers for point in plan(read)]
+    kept: list[Any] = [point.numbers for point in plan(read)]
     assert len(kept) == 8 and all(width <= 2 * height for width, height in kept)
     assert slurm_options(read.slurm, 1, tmp_path)["job_cpu"] == 8
 
@@ -342,7 +348,9 @@ def test_documented_sweep_is_valid(tmp_path):
         ('mode = "sample"\nsamples = 1000000000', "linspace = { start = 0.1, stop = 0.3 }", "samples"),
     ],
 )
-def test_more_points_than_a_table_can_hold_are_refused(tmp_path, head, values, key):
+def test_more_points_than_a_table_can_hold_are_refused(
+    tmp_path: Path, head: str, values: Any, key: Any
+) -> None:
     """Fails when the points of a slip (a number of samples with zeros too many) fill the memory before anything is said."""
     with pytest.raises(InputError, match=f"{key}.*: found 1000000000"):
         read_sweep(sweep_file(tmp_path, axis("motion.gamma", values), head))

@@ -44,7 +44,7 @@ def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
     return process.returncode, messages
 
 
-def test_a_coarse_zone_with_a_failing_and_a_refused_point(tmp_path):
+def test_a_coarse_zone_with_a_failing_and_a_refused_point(tmp_path: Path) -> None:
     """Fails when runs do not start as the driver starts them, numbers land in the wrong row, or a status is another."""
     thin = '[[sweep.axis]]\nkey = "gas.viscosity"\nname = "mu"\n'
     thin += 'values = ["1.72e-5 Pa s", "1.72e-5 Pa s", "1e-12 Pa s", "1.72e-5 Pa s"]\n'
@@ -68,7 +68,7 @@ def test_a_coarse_zone_with_a_failing_and_a_refused_point(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_killed_reactor_goes_on_from_its_restart_state(tmp_path):
+def test_a_killed_reactor_goes_on_from_its_restart_state(tmp_path: Path) -> None:
     """SIGKILL of the driver while the reactor runs. Fails when the run starts over or ends with other numbers."""
     (tmp_path / "doses.toml").write_text(SWEEP.format(doses="[2e-4]", end="15 s", more=""))
     driver = command(tmp_path, "out", "-j", "1")
@@ -89,7 +89,7 @@ def test_a_killed_reactor_goes_on_from_its_restart_state(tmp_path):
         assert resumed[name].item() == pytest.approx(whole[name].item(), rel=1e-6), name
 
 
-def test_the_command_line_ends_with_2_and_one_line(tmp_path):
+def test_the_command_line_ends_with_2_and_one_line(tmp_path: Path) -> None:
     """Fails when `mpm sweep` answers a mistake otherwise than `mpm run` does, or writes anything."""
     (tmp_path / "doses.toml").write_text(SWEEP.format(doses='["1e-4 mm"]', end="1 s", more=""))
     status, messages = finish(command(tmp_path, "out"))

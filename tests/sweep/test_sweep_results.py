@@ -3,6 +3,8 @@
 import errno
 import json
 import time
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,10 +21,12 @@ from mpm.sweep.plan import plan
 from mpm.sweep.results import Results
 from mpm.sweep.sweepfile import read_sweep
 
+from .conftest import Bench
+
 SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
 
 
-def test_load_sweep_returns_a_grid_with_units(bench):
+def test_load_sweep_returns_a_grid_with_units(bench: Bench) -> None:
     """Fails when values sit at wrong coordinates, units are lost, or a failed point is a number."""
     bench.sweep(
         "[0.3, 0.77]", SPEEDS[:3], more='title = "speeds"\nwhere = ["gamma < 0.5 or speed < \'1 cm/s\'"]'
@@ -37,7 +41,7 @@ def test_load_sweep_returns_a_grid_with_units(bench):
     assert data.attrs["title"] == "speeds" and data.attrs["program"].startswith("mpm ")
 
 
-def test_load_sweep_returns_samples_as_a_frame(bench):
+def test_load_sweep_returns_samples_as_a_frame(bench: Bench) -> None:
     """Fails when a sample's frame differs from the table, or csv, parquet and provenance disagree."""
     bench.sweep("[0.1, 0.2]", SPEEDS, more='mode = "sample"\nsamples = 4')
     assert bench.run()[0] == 0
@@ -68,7 +72,7 @@ def test_load_sweep_returns_samples_as_a_frame(bench):
     ],
     ids=["lines", "map", "zip", "parallel"],
 )
-def test_pictures(bench, gammas, speeds, more):
+def test_pictures(bench: Bench, gammas: Any, speeds: Any, more: Any) -> None:
     """Fails when a kind of sweep, or a failed point in it, gives no picture."""
     bench.delay = 0.0
     bench.sweep(gammas, speeds, more, pictures="cvd.*")
@@ -78,7 +82,7 @@ def test_pictures(bench, gammas, speeds, more):
     assert picture.name == "cvd.rate_mean.png" and picture.stat().st_size > 5000
 
 
-def test_a_cut_table_is_refused_and_nan_is_an_empty_cell(bench):
+def test_a_cut_table_is_refused_and_nan_is_an_empty_cell(bench: Bench) -> None:
     """Fails when a number that lost its digits is read, or a NaN of an edited summary reaches the table."""
     bench.sweep("[0.1, 0.2]")
     assert bench.run()[0] == 0
@@ -91,7 +95,9 @@ def test_a_cut_table_is_refused_and_nan_is_an_empty_cell(bench):
     assert flatten({"a": float("nan"), "b": [1.0, float("inf")], "c": 2}) == {"b.0": 1.0, "c": 2}
 
 
-def test_a_table_that_cannot_be_written_stops_no_point(bench, monkeypatch, capsys):
+def test_a_table_that_cannot_be_written_stops_no_point(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Fails when a full disk ends the driver while points still run, or large tables are written back to back."""
     calls = []
 
@@ -103,7 +109,9 @@ def test_a_table_that_cannot_be_written_stops_no_point(bench, monkeypatch, capsy
     bench.sweep("[0.1]")
     sweep = read_sweep(bench.path / "sweep.toml")
     collector = driver.Collector(
-        Results(sweep, plan(sweep), Layout(bench.path / "out")), Pool(None, lambda: 1, ""), False
+        Results(sweep, plan(sweep), Layout(bench.path / "out")),
+        Pool(ThreadPoolExecutor(1), lambda: 1, ""),
+        False,
     )
     monkeypatch.setattr(driver, "write_csv", full)
     monkeypatch.setattr(driver, "SAVE_EVERY", 0.0)
@@ -112,7 +120,7 @@ def test_a_table_that_cannot_be_written_stops_no_point(bench, monkeypatch, capsy
     assert collector._next_save >= calls[0] + 0.05 / driver.SAVE_SHARE
 
 
-def test_every_dimensional_number_of_the_flow_has_its_unit():
+def test_every_dimensional_number_of_the_flow_has_its_unit() -> None:
     """Fails when the flow of an outlet or the drop over a layer is called a pure number, in sweep.json and on the screen."""
     assert unit_of("flow.outlets.zone1", steady=False) == unit_of("flow.inflow", steady=False) == "m^2/s"
     assert (

@@ -4,13 +4,16 @@ import os
 import re
 import signal
 from collections import Counter
+from typing import Any
 
 import pytest
+
+from .conftest import Bench
 
 SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
 
 
-def test_a_killed_driver_loses_nothing_and_leaves_nothing(bench):
+def test_a_killed_driver_loses_nothing_and_leaves_nothing(bench: Bench) -> None:
     """SIGKILL of the driver. Fails when a point goes on computing, or a finished or started one begins anew."""
     bench.delay = 1.5
     bench.sweep("[0.1, 0.2, 0.3, 0.4, 0.5]")
@@ -36,7 +39,7 @@ def test_a_killed_driver_loses_nothing_and_leaves_nothing(bench):
     assert bench.text() == bench.text("reference")
 
 
-def test_a_killed_point_goes_on_where_it_was(bench):
+def test_a_killed_point_goes_on_where_it_was(bench: Bench) -> None:
     """SIGKILL of a point. Fails when the others suffer, or the next call repeats what was finished or saved."""
     bench.delay = 1.0
     bench.sweep("[0.1, 0.2, 0.3]")
@@ -55,7 +58,7 @@ def test_a_killed_point_goes_on_where_it_was(bench):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_stops_points_and_keeps_their_state(bench, number):
+def test_ctrl_c_stops_points_and_keeps_their_state(bench: Bench, number: Any) -> None:
     """Fails when the exit status is not 130, a point survives, or the table does not tell how far it came."""
     bench.delay = 1.0
     bench.sweep("[0.1, 0.2, 0.3, 0.4]")
@@ -70,7 +73,7 @@ def test_ctrl_c_stops_points_and_keeps_their_state(bench, number):
     assert set(bench.names("step").values()) == {20} and set(bench.table().status) == {"done"}
 
 
-def test_extension_by_one_value_computes_only_that(bench):
+def test_extension_by_one_value_computes_only_that(bench: Bench) -> None:
     """Fails when a finished point of the smaller grid runs again."""
     bench.sweep("[0.1, 0.2]", SPEEDS[:2])
     assert bench.run()[0] == 0
@@ -83,7 +86,7 @@ def test_extension_by_one_value_computes_only_that(bench):
     assert list(bench.table().gamma) == [0.1, 0.1, 0.15, 0.15, 0.2, 0.2]
 
 
-def test_a_changed_case_and_a_changed_program_are_said(bench):
+def test_a_changed_case_and_a_changed_program_are_said(bench: Bench) -> None:
     """Fails when old results would silently mix with new ones."""
     bench.sweep("[0.1, 0.77]")
     assert bench.run()[0] == 0
@@ -103,7 +106,7 @@ def test_a_changed_case_and_a_changed_program_are_said(bench):
     )
 
 
-def test_a_point_that_the_disk_failed_is_tried_again(bench):
+def test_a_point_that_the_disk_failed_is_tried_again(bench: Bench) -> None:
     """Fails when want of disk space counts as the point's own numerical failure, a verdict that keeps it from being run again."""
     bench.sweep("[0.1, 0.44, 0.77]")
     for attempts in (1, 2):
@@ -116,7 +119,7 @@ def test_a_point_that_the_disk_failed_is_tried_again(bench):
         assert starts[table.point[0.44]] == attempts and starts[table.point[0.77]] == 1
 
 
-def test_a_profile_that_changes_ends_the_sweep_and_makes_new_points(bench):
+def test_a_profile_that_changes_ends_the_sweep_and_makes_new_points(bench: Bench) -> None:
     """Fails when points that were named after one profile file run with another, or the next call takes their results over."""
     profile = bench.path / "p.csv"
 

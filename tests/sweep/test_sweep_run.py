@@ -2,13 +2,16 @@
 
 import json
 import sys
+from typing import Any
 
 import numpy as np
+
+from .conftest import Bench
 
 SPEEDS = ("0.5 cm/s", "1.3 cm/s", "2 cm/s", "3 cm/s")
 
 
-def test_forty_points_two_at_a_time(bench):
+def test_forty_points_two_at_a_time(bench: Bench) -> None:
     """Fails when points run alone, in threes, twice, or the table misses one or their order."""
     gammas = [round(0.10 + 0.01 * index, 2) for index in range(10)]
     bench.sweep(str(gammas), SPEEDS)
@@ -28,7 +31,7 @@ def test_forty_points_two_at_a_time(bench):
     assert messages.splitlines()[-2] == "Next:" and "mpm report" in messages.splitlines()[-1]
 
 
-def test_failures_are_rows_and_stop_nothing(bench):
+def test_failures_are_rows_and_stop_nothing(bench: Bench) -> None:
     """Fails when a failing point stops the sweep, or its status or last error line is not in the table."""
     bench.sweep("[0.3, 0.77, 0.66, 0.88, 0.55, -1.0, 0.4]", more='columns = ["cvd.rate_mean"]')
     status, messages = bench.run()
@@ -56,7 +59,7 @@ def test_failures_are_rows_and_stop_nothing(bench):
     assert {name for name, times in bench.names("start").items() if times == 2} == again
 
 
-def test_failures_alone_are_a_verdict(bench):
+def test_failures_alone_are_a_verdict(bench: Bench) -> None:
     """Fails when a sweep whose every point has a verdict asks to be called again."""
     bench.sweep("[0.3, 0.77]")
     assert bench.run()[0] == 0
@@ -64,7 +67,7 @@ def test_failures_alone_are_a_verdict(bench):
     assert bench.run("other")[0] == 3  # nothing at all came out
 
 
-def test_points_inherit_no_launcher_and_one_thread(bench):
+def test_points_inherit_no_launcher_and_one_thread(bench: Bench) -> None:
     """Fails when a point could take itself for a rank of the driver's MPI job, or use the neighbours' cores."""
     bench.environment = {"PMI_RANK": "1", "PMI_SIZE": "4", "PMIX_RANK": "1", "SLURM_JOB_ID": "7"}
     bench.environment |= {"OMP_NUM_THREADS": "8", "MY_OWN": "kept"}
@@ -95,7 +98,7 @@ if "0.88" in Path(sys.argv[1]).read_text() and world.rank == 1:
 """
 
 
-def test_points_under_mpirun(bench, mpirun):
+def test_points_under_mpirun(bench: Bench, mpirun: Any) -> None:
     """Fails when ranks do not find each other (inherited PMI variables), or mpirun's chatter hides status or error."""
     (bench.path / "ranks.py").write_text(RANKS)
     bench.environment = {"PMI_RANK": "0", "PMI_SIZE": "1", "PMI_FD": "7"}
@@ -108,7 +111,7 @@ def test_points_under_mpirun(bench, mpirun):
     assert table.error[1] == "error: Newton stalls"
 
 
-def test_a_second_driver_and_a_foreign_directory_are_refused(bench):
+def test_a_second_driver_and_a_foreign_directory_are_refused(bench: Bench) -> None:
     """Fails when two drivers share a directory, or a sweep writes among somebody's files."""
     bench.delay = 60.0
     bench.sweep("[0.1]")
@@ -125,7 +128,7 @@ def test_a_second_driver_and_a_foreign_directory_are_refused(bench):
     assert [file.name for file in (bench.path / "mine").iterdir()] == ["thesis.txt"]
 
 
-def test_a_broken_sweep_file_writes_nothing(bench):
+def test_a_broken_sweep_file_writes_nothing(bench: Bench) -> None:
     """Fails when a typo costs more than its one line: exit status 2, no directory."""
     bench.sweep("[0.1]", more='mod = "grid"')
     status, messages = bench.run()
