@@ -27,8 +27,8 @@ from mpm.advice.doses import Dose, checked_doses
 from mpm.case.kinds import SEARCH, kind_of_directory, what_it_is
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
+from mpm.reactor.flow import Flow
 from mpm.reactor.reactor import Reactor
-from mpm.reactor.sequence import Replay
 from mpm.report.dosing import inlet_excess
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Search:
         self.case, self.doses, self.fidelity = case.with_({"fidelity": "steady"}), doses, case.fidelity
         self.target, self.weight = target, weight
         self.points: list[Point] = []
-        self._flow: tuple[tuple[float, ...], Replay] | None = None
+        self._flow: tuple[tuple[float, ...], Flow] | None = None  # of these inlet velocities
         self._known: dict[tuple[float, ...], Point | None] = {}
 
     def case_at(self, values: Mapping[str, float]) -> Case:
@@ -79,19 +79,17 @@ class Search:
 
     def _solve(self, values: tuple[float, ...]) -> Point | None:
         doses = {dose.key: value for dose, value in zip(self.doses, values, strict=True)}
-        reactor = Reactor(self.case_at(doses))
-        velocities = tuple(inlet.velocity for inlet in reactor.case.geometry.inlets)
-        if self._flow is not None and self._flow[0] == velocities:
-            kept = self._flow[1]
-            reactor.flows = Replay(reactor.strip, kept.fields, kept.rests, kept.dispersion)
+        case = self.case_at(doses)
+        velocities = tuple(inlet.velocity for inlet in case.geometry.inlets)
+        known = self._flow[1] if self._flow is not None and self._flow[0] == velocities else None
+        reactor = Reactor(case, flow=known)
         try:
             summary = reactor.run().summary
         except ConvergenceError as error:
             log.warning("optimise: %s", error)
             return None
-        assert isinstance(reactor.flows, Replay)
-        self._flow = (velocities, reactor.flows)
-        dosed = {e[0] for i in reactor.case.geometry.inlets if (e := inlet_excess(reactor.case, i))}
+        self._flow = (velocities, reactor.flow)
+        dosed = {e[0] for i in case.geometry.inlets if (e := inlet_excess(case, i))}
         point = Point(
             doses,
             {name: entry["exit_mean"] for name, entry in summary["titration"].items()},

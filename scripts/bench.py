@@ -43,8 +43,8 @@ def worker(name: str, fidelity: str, seconds: float) -> None:
     spent = {"flow": 0.0, "reacting": 0.0, "products": 0.0}
     watched = {
         "flow": (reactor, "_start"),
-        "reacting": (reactor.transport, "_solve_coupled"),
-        "products": (reactor.transport, "_solve_linear"),
+        "reacting": (reactor.system.transport, "_solve_coupled"),
+        "products": (reactor.system.transport, "_solve_linear"),
     }
     for key, (owner, name) in watched.items():
         _time(owner, name, spent, key)
@@ -53,8 +53,8 @@ def worker(name: str, fidelity: str, seconds: float) -> None:
         result = reactor.run(reactor.comm.bcast(directory, root=0))
     wall = time.perf_counter() - begun
     peak = total(reactor.comm, [resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0])[0]
-    problem = FlowProblem(case, reactor.strip, reactor.schedule.dt)
-    problem.settle(mean_motion(reactor.motion), problem.convective_force())
+    problem = FlowProblem(case, reactor.system.strip, reactor.system.schedule.dt)
+    problem.solve_steady(mean_motion(reactor.system.bed_motion), problem.convective_force())
     problem.step(REST)
     steps = 5
     start = time.perf_counter()

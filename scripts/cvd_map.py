@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from mpm import Reactor, load_case
-from mpm.reactor.sequence import Replay
+from mpm.reactor.flow import Flow
 from mpm.report.dosing import inlet_excess
 
 ROOT = Path(__file__).parents[1]
@@ -45,7 +45,7 @@ def measure() -> dict[str, dict[str, float]]:
         excess = inlet_excess(base, inlet)
         if excess is not None and excess[2] is not None:
             saturating[inlet.name] = inlet.mass_fractions[excess[0]] / excess[2]
-    flow: Replay | None = None
+    flow: Flow | None = None
     for tma in RATIOS:
         for water in RATIOS:
             key = f"{tma:g},{water:g}"
@@ -53,12 +53,8 @@ def measure() -> dict[str, dict[str, float]]:
                 continue
             doses = {"tma": tma * saturating["tma"], "water": water * saturating["water"]}
             case = base.with_({f"geometry.inlet.{i}.mass_fractions.{s}": doses[i] for i, s in INLETS.items()})
-            reactor = Reactor(case)
-            if flow is not None:
-                reactor.flows = Replay(reactor.strip, flow.fields, flow.rests)
-            summary = reactor.run().summary
-            assert isinstance(reactor.flows, Replay)
-            flow = reactor.flows
+            reactor = Reactor(case, flow=flow)
+            summary, flow = reactor.run().summary, reactor.flow
             found[key] = {
                 "rate": summary["cvd"]["rate_mean"],
                 "share": summary["cvd"]["total"] / summary["species"]["TMA"]["fed"],

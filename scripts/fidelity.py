@@ -20,7 +20,7 @@ from document import write_between
 
 from mpm import Reactor, load_case
 from mpm.parallel import is_root
-from mpm.reactor.sequence import Replay
+from mpm.reactor.flow import Flow
 
 from mpi4py import MPI  # isort: skip  (after mpm.numerics.fem)
 
@@ -45,16 +45,12 @@ def record(model: str, dose: float) -> Path:
     return KEPT / f"{model.replace(', ', '-').replace(' ', '')}-{dose:g}.npz"
 
 
-def measure(model: str, dose: float, flow: Replay | None) -> Replay:
+def measure(model: str, dose: float, flow: Flow | None) -> Flow:
     """Run one model and keep its coverage of the bed (rows, columns) with its numbers; returns the flow it used."""
     changes: dict[str, Any] = {f"geometry.layer.{layer}.cells": n for layer, n in ROWS.items()}
     changes |= {**MODELS[model], "geometry.inlet.tma.mass_fractions.TMA": dose, "output.every": "1 s"}
-    reactor = Reactor(load_case(ROOT / "cases" / "single_zone.toml", changes))
-    if flow is None:
-        flow = Replay.solve(reactor.case, reactor.strip, reactor.motion, reactor.schedule, None)
-    else:
-        flow = Replay(reactor.strip, flow.fields, flow.rests)
-    reactor.flows = flow
+    reactor = Reactor(load_case(ROOT / "cases" / "single_zone.toml", changes), flow=flow)
+    flow = reactor.flow
     begun = time.process_time()
     summary = reactor.run().summary
     seconds = time.process_time() - begun
@@ -108,7 +104,7 @@ def main() -> None:
     parser.add_argument("--dose", type=float, nargs="*", default=DOSES, choices=DOSES)
     parser.add_argument("--model", nargs="*", default=list(MODELS), choices=MODELS)
     chosen = parser.parse_args()
-    flows: dict[str, Replay | None] = {"resolved": None, "averaged": None}
+    flows: dict[str, Flow | None] = {"resolved": None, "averaged": None}
     for model in chosen.model:
         kind = model.split(",")[0]
         for dose in chosen.dose:

@@ -21,7 +21,7 @@ from document import write_between
 from mpm import Case, Reactor, load_case
 from mpm.errors import ConvergenceError
 from mpm.parallel import is_root
-from mpm.reactor.sequence import Replay
+from mpm.reactor.flow import Flow
 
 from mpi4py import MPI  # isort: skip  (after mpm.numerics.fem)
 
@@ -84,16 +84,12 @@ def four_cycles(dose: float) -> dict[str, Any]:
 
 
 def measure(
-    mesh: str, kind: str, dose: float, speed: float, flow: Replay | None
-) -> tuple[dict[str, Any], Replay]:
+    mesh: str, kind: str, dose: float, speed: float, flow: Flow | None
+) -> tuple[dict[str, Any], Flow]:
     """What one steady state takes and gives, and the flow it used: that does not depend on the dose."""
-    reactor = Reactor(grid_case(mesh, kind, dose, speed))
+    reactor = Reactor(grid_case(mesh, kind, dose, speed), flow=flow)
     begun, clock = time.process_time(), time.monotonic()
-    if flow is None:
-        flow = Replay.solve(reactor.case, reactor.strip, reactor.motion, reactor.schedule, None)
-    else:
-        flow = Replay(reactor.strip, flow.fields, flow.rests)
-    reactor.flows = flow
+    flow = reactor.flow
     numbers: dict[str, Any] = {"cells": reactor.grid.cells, "ranks": reactor.comm.size}
     numbers |= {"flow_seconds": time.process_time() - begun, "flow_wall": time.monotonic() - clock}
     begun, clock = time.process_time(), time.monotonic()
@@ -157,7 +153,7 @@ def main() -> None:
         if mesh not in chosen.mesh or kind not in chosen.kind:
             continue
         for speed in chosen.speed:
-            flow: Replay | None = None
+            flow: Flow | None = None
             for dose in (d for d in DOSES[mesh] if d in chosen.dose):
                 path = KEPT / f"{mesh}-{kind}-{dose:g}-{speed:g}.json"
                 if path.exists():

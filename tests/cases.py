@@ -8,8 +8,9 @@ import numpy as np
 
 import mpm.numerics.fem  # noqa: F401  (loads the finite-element stack before mpi4py)
 from mpm.case.case import Case, load_case
-from mpm.flow.problem import boundary_flows, face_flow
-from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP
+from mpm.flow.fields import FlowField, boundary_flows, face_flow, net_outflow
+from mpm.flow.sequence import CyclicFlow
+from mpm.mesh.strip import Strip
 from mpm.parallel import largest
 from mpm.reactor.reactor import Reactor, Result
 from mpm.report.balances import element_balances, site_balance, species_balances
@@ -80,15 +81,15 @@ def assert_laws(reactor: Reactor) -> None:
     Species, sites and elements balance to 1e-9; no concentration lies below -1e-14 of the feed; coverages lie in [0, 1] and sum to 1;
     div u of any cell is below 1e-10 of the inflow, in every velocity field in use; what flows in flows out.
     """
-    case, comm, strip = reactor.case, reactor.comm, reactor.strip
+    case, comm, strip = reactor.case, reactor.comm, reactor.system.strip
     totals = reactor.totals()
     errors = {name: entry["balance_error"] for name, entry in species_balances(case, totals).items()}
     errors |= {"sites": site_balance(case, totals), **element_balances(case, totals)}
     assert max(errors.values()) <= 1e-9, f"t = {reactor.time:g} s: balances {errors}"
 
-    transport, theta = reactor.transport, reactor.bed.theta
+    transport, theta = reactor.system.transport, reactor.system.coverage.theta
     lowest = -largest(comm, [-transport.concentration.min(initial=0.0)])[0]
-    assert lowest >= -1e-14 * transport.largest_feed, (
+    assert lowest >= -1e-14 * transport.ports.largest_feed, (
         f"t = {reactor.time:g} s: concentration {lowest:g} mol/m3"
     )
     assert np.all(np.isfinite(transport.concentration))
@@ -97,18 +98,28 @@ def assert_laws(reactor: Reactor) -> None:
     )
     np.testing.assert_allclose(theta.sum(axis=0), 1.0, rtol=0.0, atol=1e-11)
 
-    assert reactor.flows is not None
-    fields = getattr(reactor.flows, "fields", None) or [reactor.flows.current]
-    height, dx = strip.height[: strip.owned], strip.grid.dx
-    inflow = sum(i.velocity * i.width for i in case.geometry.inlets)
+    sequence = reactor.flow.sequence
+    fields = [reactor.system.velocity]
+    if isinstance(sequence, CyclicFlow):
+        fields = [*sequence.phases, *([] if sequence.at_rest is None else [sequence.at_rest])]
     for field in fields:
-        u = field.velocities[:, : strip.owned]
-        net = (u[RIGHT] - u[LEFT]) * height + (u[TOP] - u[BOTTOM]) * dx
-        worst, fastest = largest(comm, [np.abs(net).max(initial=0.0), np.abs(u).max(initial=0.0)])
-        scale = inflow or fastest * dx
-        assert worst <= 1e-10 * scale, f"div u is {worst / scale:.2g} of the inflow"
+        assert_free_of_divergence(case, strip, field)
         flows = boundary_flows(case, strip, face_flow(strip, field.velocities))
-        assert abs(sum(flows.values())) <= 1e-10 * scale, f"port flows {flows}"
+        assert abs(sum(flows.values())) <= 1e-10 * flow_scale(case, strip, field), f"port flows {flows}"
+
+
+def flow_scale(case: Case, strip: Strip, field: FlowField) -> float:
+    """The inflow of a case, or without one the largest flow through a facet [m2/s]; collective."""
+    inflow = sum(i.velocity * i.width for i in case.geometry.inlets)
+    fastest = largest(strip.comm, [np.abs(field.velocities[:, : strip.owned]).max(initial=0.0)])[0]
+    return float(inflow or fastest * strip.grid.dx)
+
+
+def assert_free_of_divergence(case: Case, strip: Strip, field: FlowField) -> None:
+    """Assert that no cell gains or loses more than 1e-10 of the inflow; collective."""
+    worst = largest(strip.comm, [np.abs(net_outflow(strip, field.velocities)).max(initial=0.0)])[0]
+    scale = flow_scale(case, strip, field)
+    assert worst <= 1e-10 * scale, f"div u is {worst / scale:.2g} of the inflow"
 
 
 def run(case: Case, comm: MPI.Comm = MPI.COMM_SELF, **options: Any) -> tuple[Reactor, Result]:

@@ -13,22 +13,23 @@ from mpm.output.directory import RunDirectory
 from mpm.reactor.reactor import Reactor
 from mpm.report.balances import worst_balance
 from mpm.report.records import Totals
-from mpm.transport.species import Transport
+from mpm.transport.ledger import Ledger
+from mpm.transport.ports import Ports
 
 from .cases import CASES, MPI, SHORT, TINY, assert_same_numbers, physical_numbers, zone
 
 
 def lose_methane(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
     """From now on the ledger misses this share of the methane that leaves."""
-    book = Transport.book
+    book = Ledger.book
 
-    def miscounted(self: Transport, *arguments: Any) -> None:
-        before = self.ledger.out.copy()
-        book(self, *arguments)
-        methane = self.names.index("CH4")
-        self.ledger.out[:, methane] -= share * (self.ledger.out - before)[:, methane]
+    def miscounted(self: Ledger, ports: Ports, *arguments: Any) -> None:
+        before = self.passed.out
+        book(self, ports, *arguments)
+        methane = ports.names.index("CH4")
+        self.passed.out[:, methane] -= share * (self.passed.out - before)[:, methane]
 
-    monkeypatch.setattr(Transport, "book", miscounted)
+    monkeypatch.setattr(Ledger, "book", miscounted)
 
 
 def settings(changes: dict[str, Any]) -> list[str]:

@@ -6,25 +6,25 @@ import pytest
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.parallel import total
-from mpm.transport.coverage import MEMORY, Bed
+from mpm.transport.coverage import MEMORY, Coverage
 
 from .cases import MPI, TINY, zone
 
 COMM = MPI.COMM_WORLD
 
 
-def marked(changes: dict[str, object] | None = None) -> Bed:
-    """A bed whose every column and row has a coverage of its own, the same on any number of ranks."""
+def marked(changes: dict[str, object] | None = None) -> Coverage:
+    """The coverage of solids whose every column and row has its own, the same on any number of ranks."""
     case = zone(changes, TINY)
     strip = Strip(case, COMM)
-    bed = Bed(case, strip)
+    bed = Coverage(case, strip)
     rows, columns = len(bed.rows), strip.grid.columns
     first = np.linspace(0.1, 0.9, rows * columns)
-    bed.theta = bed.scatter.to_local(np.stack([first, 1.0 - first]))
+    bed.become(bed.scatter.to_local(np.stack([first, 1.0 - first])))
     return bed
 
 
-def moving(bed: Bed) -> np.ndarray:
+def moving(bed: Coverage) -> np.ndarray:
     """Coverage of the first site in the moving layer (rows, columns); collective."""
     return bed.whole()[0, bed.moving_rows]
 
@@ -36,8 +36,8 @@ def test_swinging_back_restores_everything(inflow: str) -> None:
     bed = marked({"geometry.bed_inflow": inflow})
     before = moving(bed)
     for there, back in ((3.2, -3.2), (-2.7, 2.7), (5.0, -9.0), (4.0, 0.0)):
-        bed.advance(there * bed.dx)
-        bed.advance(back * bed.dx)
+        bed.slide(there * bed.strip.grid.dx)
+        bed.slide(back * bed.strip.grid.dx)
     np.testing.assert_array_equal(moving(bed), before)
     np.testing.assert_allclose(bed.passed, 0.0, atol=1e-20)
 
@@ -48,7 +48,7 @@ def test_fresh_solids_enter_on_either_side() -> None:
     for direction in (1, -1):
         bed = marked()
         before, frit = moving(bed), np.delete(bed.whole()[0], bed.moving_rows, axis=0)
-        bed.advance(direction * 2.0 * bed.dx)
+        bed.slide(direction * 2.0 * bed.strip.grid.dx)
         after = moving(bed)
         if direction > 0:
             np.testing.assert_array_equal(after[:, 2:], before[:, :-2])
@@ -69,7 +69,7 @@ def test_sites_that_pass_are_counted() -> None:
         initially = total(COMM, bed.content())
         rng = np.random.default_rng(4)
         for _ in range(40):
-            bed.advance(rng.normal(0.7, 2.0) * bed.dx)
+            bed.slide(rng.normal(0.7, 2.0) * bed.strip.grid.dx)
             np.testing.assert_allclose(total(COMM, bed.content()) + bed.passed, initially, rtol=1e-13)
         if inflow == "periodic":
             assert not bed.passed.any()
@@ -82,12 +82,12 @@ def test_position_error_is_below_half_a_column() -> None:
     rng = np.random.default_rng(9)
     distance = 0.0
     for _ in range(300):
-        slide = rng.normal(0.02, 0.3) * bed.dx
+        slide = rng.normal(0.02, 0.3) * bed.strip.grid.dx
         distance += slide
-        bed.advance(slide)
-        assert abs(bed.shifted * bed.dx - distance) <= 0.5 * bed.dx * (1 + 1e-9)
+        bed.slide(slide)
+        assert abs(bed.shifted * bed.strip.grid.dx - distance) <= 0.5 * bed.strip.grid.dx * (1 + 1e-9)
     once = marked()
-    once.advance(distance)
+    once.slide(distance)
     assert once.shifted == bed.shifted
 
 
@@ -100,7 +100,7 @@ def test_a_step_is_carried_once_around_exactly(gamma: float) -> None:
     With vibration the bed swings forwards and backwards within each cycle; a bed speed that covers the length in 430 cycles.
     """
     bed = marked({"geometry.bed_inflow": "periodic"})
-    length = bed.columns * bed.dx
+    length = bed.columns * bed.strip.grid.dx
     cycles = 430
     speed = length * 16.0 / cycles
     case = zone(
@@ -109,10 +109,10 @@ def test_a_step_is_carried_once_around_exactly(gamma: float) -> None:
     motion = BedMotion(case.motion)
     step = np.zeros((len(bed.rows), bed.columns))
     step[:, bed.columns // 3 : bed.columns // 2] = 1.0
-    bed.theta = bed.scatter.to_local(np.stack([step.ravel(), 1.0 - step.ravel()]))
+    bed.become(bed.scatter.to_local(np.stack([step.ravel(), 1.0 - step.ravel()])))
     dt, passed_half = 1.0 / 16.0 / 32, False
     for n in range(32 * cycles):
-        moved = bed.advance(step_motion(motion, n * dt, (n + 1) * dt).slide)
+        moved = bed.slide(step_motion(motion, n * dt, (n + 1) * dt).slide)
         if moved and n > 16 * cycles and not passed_half:
             passed_half = True
             np.testing.assert_array_equal(moving(bed), np.roll(step[bed.moving_rows], bed.shifted, axis=1))
@@ -126,19 +126,19 @@ def test_memory_of_columns_is_bounded() -> None:
     """Fails when a long run keeps every column that ever left."""
     bed = marked()
     for _ in range(3 * MEMORY):
-        bed.advance(bed.dx)
-    assert len(bed.right) == MEMORY and not bed.left
+        bed.slide(bed.strip.grid.dx)
+    assert len(bed.stored()["right"]) == MEMORY and not len(bed.stored()["left"])
 
 
 def test_recall_undoes_a_step() -> None:
     """Fails when a rejected step leaves the bed moved: the restart state would not be the last good one."""
     bed = marked()
-    bed.advance(1.3 * bed.dx)
+    bed.slide(1.3 * bed.strip.grid.dx)
     memento, before = bed.memento(), bed.whole()
-    bed.advance(4.0 * bed.dx)
+    bed.slide(4.0 * bed.strip.grid.dx)
     bed.recall(memento)
     np.testing.assert_array_equal(bed.whole(), before)
-    assert bed.shifted == 1 and bed.distance == 1.3 * bed.dx and len(bed.right) == 1
+    assert bed.shifted == 1 and bed.distance == 1.3 * bed.strip.grid.dx and len(bed.stored()["right"]) == 1
 
 
 def test_capacity_is_s_ns_v() -> None:

@@ -36,7 +36,7 @@ def test_courant_number_of_plug_flow() -> None:
     strip = Strip(case, MPI.COMM_SELF)
     upwards = np.zeros((4, strip.local))
     upwards[[0, 3]] = 0.03
-    assert courant_number(case, strip, upwards, 0.01) == pytest.approx(0.03 * 0.01 / 0.5 / 1e-3, rel=1e-12)
+    assert courant_number(strip, upwards, 0.01) == pytest.approx(0.03 * 0.01 / 0.5 / 1e-3, rel=1e-12)
     assert driving_speed(case) == pytest.approx(0.03)
 
 

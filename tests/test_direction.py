@@ -16,7 +16,7 @@ from mpm.parallel import on_root
 from mpm.pictures.curves import exits
 from mpm.pictures.outline import way
 from mpm.reactor.reactor import Reactor
-from mpm.transport.coverage import Bed
+from mpm.transport.coverage import Coverage
 
 from .cases import MPI, SHORT, TINY, assert_same_numbers, cycle, run, zone
 
@@ -125,7 +125,7 @@ def test_resolved_bed_that_creeps_to_the_left(tmp_path: Path) -> None:
         "geometry.inlet.water.start": "0 s",
     }
     reactor, result = run(cycle({**changes, "output.every": "0.5 s"}, TINY))
-    assert reactor.bed.distance == pytest.approx(-0.013 * (1.0 - 0.05), rel=0.02)
+    assert reactor.system.coverage.distance == pytest.approx(-0.013 * (1.0 - 0.05), rel=0.02)
     assert result.summary["film"]["Al2O3"]["per_area"] > 0.0
     exit_profile = result.summary["titration"]["tma"]["exit_profile"]
     np.testing.assert_array_equal(exit_profile, result.coverage("bed", "OAl(CH3)2")[:, 0])
@@ -149,9 +149,9 @@ def test_columns_shift_alike_in_both_directions(steps: int, tmp_path: Path) -> N
     """Fails when the bed slides by a column at another step to the left than to the right, half a column being met exactly."""
     case = zone({}, TINY)
     strip = Strip(case, MPI.COMM_SELF)
-    right, left = Bed(case, strip), Bed(case, strip)
-    way_of_a_step = right.dx / steps
-    shifts = [(right.advance(way_of_a_step), left.advance(-way_of_a_step)) for _ in range(3 * steps)]
+    right, left = Coverage(case, strip), Coverage(case, strip)
+    way_of_a_step = strip.grid.dx / steps
+    shifts = [(right.slide(way_of_a_step), left.slide(-way_of_a_step)) for _ in range(3 * steps)]
     assert all(a == -b for a, b in shifts)
     assert sum(a for a, _ in shifts) in (2, 3)
 

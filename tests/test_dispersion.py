@@ -133,7 +133,7 @@ def test_restart_keeps_dispersion(tmp_path: Path) -> None:
     _, whole = run(case)
     run(case.with_({"time.end": "0.5 s"}), output=tmp_path / "half")
     reactor, resumed = run(case, output=tmp_path / "half", resume=True)
-    assert reactor.flows.dispersion is not None
+    assert reactor.flow.dispersion is not None
     assert_same_numbers(whole.summary, resumed.summary, 1e-10)
 
 
@@ -150,6 +150,6 @@ def test_ranks_agree_on_dispersion() -> None:
     results = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
         reactor = Reactor(case, comm)
-        k = vibrational_dispersion(case, reactor.strip, reactor.motion, [1e-5, 2.88e-5])
-        results.append(reactor.strip.scatter.to_all(k[:, :, : reactor.strip.owned]))
+        k = vibrational_dispersion(case, reactor.system.strip, reactor.system.bed_motion, [1e-5, 2.88e-5])
+        results.append(reactor.system.strip.scatter.to_all(k[:, :, : reactor.system.strip.owned]))
     np.testing.assert_allclose(results[1], results[0], rtol=0.0, atol=1e-9 * np.abs(results[0]).max())

@@ -69,7 +69,7 @@ def test_ranks_agree(name: str, tmp_path: Path) -> None:
 def test_every_rank_has_cells() -> None:
     """Fails when the mesh is not spread over the ranks: the other tests would prove nothing."""
     reactor = Reactor(CASES["averaged"], COMM)
-    owned = reactor.strip.owned
+    owned = reactor.system.strip.owned
     assert owned > 0.5 * reactor.grid.cells / COMM.size
     assert total(COMM, [owned])[0] == reactor.grid.cells
 

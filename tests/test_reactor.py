@@ -15,7 +15,7 @@ import mpm.transport.species
 from mpm.case.case import Case
 from mpm.errors import ConvergenceError
 from mpm.reactor.reactor import Reactor
-from mpm.transport.species import Transport
+from mpm.transport.cell_matrix import StepMatrix
 
 from .cases import MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, physical_numbers, run, zone
 
@@ -97,9 +97,11 @@ def test_every_mode_conserves(mode: str, tmp_path: Path) -> None:
     assert tma["fed"] > 0.0 and tma["reacted"] > 0.0
     assert reactor.time == reactor.case.time.end
     if mode == "bed moving backwards":
-        assert reactor.bed.shifted < -60 and reactor.motion.mean == pytest.approx(-0.02, rel=1e-3)
+        assert reactor.system.coverage.shifted < -60 and reactor.system.bed_motion.mean == pytest.approx(
+            -0.02, rel=1e-3
+        )
     if mode == "ports that reverse in the lab":
-        assert reactor.transport.ledger.back.sum() > 0.0, "no outlet drew gas back in"
+        assert reactor.system.transport.ledger.passed.back.sum() > 0.0, "no outlet drew gas back in"
     if mode == "dose windows":
         feed = reactor.case.feed_concentrations({"TMA": 2e-4})["TMA"]
         assert tma["fed"] == pytest.approx(0.035 * 4e-3 * feed * (0.233 + 0.22), rel=1e-9)
@@ -121,8 +123,8 @@ def test_bed_swings_backwards_within_cycles() -> None:
     }
     reactor = Reactor(zone(changes, {**TINY, "geometry.cell_width": "0.7 mm"}), MPI.COMM_SELF)
     shifts: list[int] = []
-    advance = reactor.bed.advance
-    reactor.bed.advance = lambda distance: (shifts.append(advance(distance)), shifts[-1])[1]  # type: ignore[method-assign]
+    advance = reactor.system.coverage.slide
+    reactor.system.coverage.slide = lambda distance: (shifts.append(advance(distance)), shifts[-1])[1]  # type: ignore[method-assign]
     reactor.run(callback=assert_laws)
     assert shifts.count(-1) >= 4 and shifts.count(1) >= 4
 
@@ -132,14 +134,14 @@ def test_averaged_bed_does_not_shake() -> None:
     several times as long as their neighbours, and stripes of single columns would cross the coverage. Here one must pass in two steps."""
     case = zone({**SHORT, "time.end": "0.5 s"}, {**TINY, "geometry.cell_width": "0.34 mm"})
     reactor = Reactor(case, MPI.COMM_SELF)
-    assert 2.0 * reactor.motion.vibration.ax > 0.9 * reactor.grid.dx  # it would shake by a column
+    assert 2.0 * reactor.system.bed_motion.vibration.ax > 0.9 * reactor.grid.dx  # it would shake by a column
     shifts: list[int] = []
-    advance = reactor.bed.advance
-    reactor.bed.advance = lambda distance: (shifts.append(advance(distance)), shifts[-1])[1]  # type: ignore[method-assign]
+    advance = reactor.system.coverage.slide
+    reactor.system.coverage.slide = lambda distance: (shifts.append(advance(distance)), shifts[-1])[1]  # type: ignore[method-assign]
     reactor.run(callback=assert_laws)
-    sliding = shifts[reactor.schedule.resting_steps :]
+    sliding = shifts[reactor.system.schedule.resting_steps :]
     assert len(sliding) > 30 and sliding == [k % 2 for k in range(len(sliding))]
-    assert reactor.bed.distance == pytest.approx(0.013 * (reactor.time - 0.05), rel=1e-12)
+    assert reactor.system.coverage.distance == pytest.approx(0.013 * (reactor.time - 0.05), rel=1e-12)
 
 
 def test_both_precursors_and_their_reaction_in_the_gas() -> None:
@@ -191,7 +193,7 @@ def test_a_third_kind_of_site_changes_nothing_when_nothing_makes_it() -> None:
     changes = {"time.end": "2 s", "time.step": "20 ms", "output.every": "1 s"}
     _, two = run(cycle(changes, TINY))
     reactor, three = run(cycle({**changes, "chemistry.site.inert.formula": "O"}, TINY))
-    assert len(reactor.bed.theta) == 3
+    assert len(reactor.system.coverage.theta) == 3
     assert_same_numbers(two.summary, three.summary, 1e-8)
 
 
@@ -249,7 +251,7 @@ def test_result_and_callback() -> None:
     reactor = Reactor(zone(SHORT, TINY), MPI.COMM_SELF)
     result = reactor.run(callback=lambda r: times.append(r.time))
     late = np.array(times) - [0.0, 0.25, 0.5, 0.75, 1.0]  # the first step that reaches the output time
-    assert late.min() >= -1e-9 and late.max() < reactor.schedule.dt
+    assert late.min() >= -1e-9 and late.max() < reactor.system.schedule.dt
     assert result.history["time"].tolist() == times
     for column in (
         "titration.tma.box_mean",
@@ -291,15 +293,15 @@ def test_newton_knows_what_rounding_allows() -> None:
 
 def test_a_failed_step_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails when a step whose solver gives up is not repeated in halves from the state before it, coverage included."""
-    solve, calls = Transport._solve_linear, {"n": 0}
+    solve, calls = StepMatrix.solve, {"n": 0}
 
-    def sometimes(self: Transport, *arguments: Any) -> Any:
+    def sometimes(self: StepMatrix, *arguments: Any) -> Any:
         calls["n"] += 1
         if calls["n"] % 7 == 3:  # after Newton has succeeded
             raise ConvergenceError("linear solver, on purpose")
         return solve(self, *arguments)
 
-    monkeypatch.setattr(Transport, "_solve_linear", sometimes)
+    monkeypatch.setattr(StepMatrix, "solve", sometimes)
     reactor, halved = run(zone(SHORT, TINY))
     assert calls["n"] > 1.3 * reactor.steps
     monkeypatch.undo()

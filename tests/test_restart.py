@@ -17,12 +17,12 @@ import pytest
 
 from mpm.case.case import Case
 from mpm.errors import InputError, Interrupted
+from mpm.flow.sequence import CyclicFlow
 from mpm.output.directory import RunDirectory
 from mpm.output.results import load_run
 from mpm.parallel import on_root, total
 from mpm.reactor import checkpoint
 from mpm.reactor.reactor import Reactor, Result
-from mpm.reactor.sequence import Replay
 
 from .cases import MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, run, zone
 
@@ -53,7 +53,7 @@ def interrupted(case: Case, folder: Path, after: float, comm: MPI.Comm = COMM) -
 
     def stop(reactor: Reactor) -> None:
         if reactor.time > after:
-            reactor._stop = True
+            reactor.stop()
 
     with pytest.raises(Interrupted):
         Reactor(case, comm).run(output=folder, callback=stop)
@@ -107,7 +107,7 @@ def test_restart_state_is_complete_on_several_ranks(mode: str, tmp_path: Path) -
     def write(r: Reactor) -> None:
         if r.time > 0.11 and not written:
             written.append(r.time)
-            checkpoint.write(r, directory)
+            checkpoint.write(r.course, checkpoint.identity(case), directory)
 
     whole = reactor.run(callback=write)
     assert written and written[0] < 0.8 * reactor.time
@@ -144,7 +144,7 @@ def test_resume_accepts_a_later_end(mode: str, tmp_path: Path) -> None:
     _, whole = run(longer)
     reactor, first = run(longer.with_({"time.end": "0.237 s"}), output=tmp_path / "run")
     assert first.summary["simulated_seconds"] == first.history["time"][-1] == 0.237
-    assert reactor.schedule.step(reactor.steps - 1).cut
+    assert reactor.system.schedule.step(reactor.steps - 1).cut
     assert first.summary["species"]["TMA"]["fed"] == pytest.approx(
         0.237 / 0.33 * whole.summary["species"]["TMA"]["fed"], rel=1e-9
     )
@@ -239,7 +239,7 @@ def test_a_flow_once_found_is_not_lost(tmp_path: Path, monkeypatch: pytest.Monke
 
     with pytest.raises(MemoryError):
         Reactor(case, MPI.COMM_SELF).run(output=tmp_path / "run", callback=die)
-    monkeypatch.setattr(Replay, "solve", None)
+    monkeypatch.setattr(CyclicFlow, "solve", None)
     reactor, resumed = run(case, output=tmp_path / "run", resume=True)
     assert reactor.history()["time"].tolist() == whole.history["time"].tolist()
     assert_same_numbers(whole.summary, resumed.summary, 1e-12)
@@ -389,4 +389,4 @@ def test_laws_hold_at_every_step() -> None:
         seen.append(r.time)
 
     reactor.run(callback=look)
-    assert len(seen) == reactor.schedule.steps + 1
+    assert len(seen) == reactor.system.schedule.steps + 1

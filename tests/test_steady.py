@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-import mpm.reactor.coarsening
-import mpm.reactor.steady
+import mpm.reactor.steady.coarsening
+import mpm.reactor.steady.solver
 from mpm.case.case import Case, load_case
 from mpm.cli import main
 from mpm.errors import ConvergenceError
 from mpm.output.results import load_run
 from mpm.physics.exponentials import phi1, phi2
+from mpm.reactor.flow import Flow
 from mpm.reactor.reactor import Reactor
-from mpm.reactor.sequence import Replay
 
 from .cases import (
     CASES,
@@ -48,14 +48,11 @@ def grid_case(kind: str, dose: float, speed: float, mesh: dict) -> Case:
 @pytest.mark.parametrize("kind", ["zone", "cycle"])
 def test_converges_from_a_cold_start(kind: str, speed: float) -> None:
     """Fails when any dose from 1e-5 to 1e-2 does not converge at this bed speed, or converges to something that is out of balance."""
-    kept: Replay | None = None
+    kept: Flow | None = None  # it does not depend on the dose
     for dose in DOSES:
-        reactor = Reactor(grid_case(kind, dose, speed, COARSE), MPI.COMM_SELF)
-        if kept is not None:  # the flow does not depend on the dose
-            reactor.flows = Replay(reactor.strip, kept.fields, kept.rests)
+        reactor = Reactor(grid_case(kind, dose, speed, COARSE), MPI.COMM_SELF, flow=kept)
         result = reactor.run(callback=assert_laws)
-        assert isinstance(reactor.flows, Replay)
-        kept = reactor.flows
+        kept = reactor.flow
         assert result.summary["status"] == "done", (dose, speed)
         assert 0 < reactor.steps < 300, reactor.steps
 
@@ -109,7 +106,7 @@ def test_long_time_limit_of_averaged(dose: float, speed: str, end: int) -> None:
     )
     means: list[float] = []
     averaged.run(callback=lambda r: means.append(float(r.coverage("bed", site).mean())))
-    period = averaged.grid.dx / averaged.motion.mean / averaged.case.time.step  # steps per slide
+    period = averaged.grid.dx / averaged.system.bed_motion.mean / averaged.case.time.step  # steps per slide
     late, before = (
         np.mean(means[-round(10 * period) :]),
         np.mean(means[-round(20 * period) : -round(10 * period)]),
@@ -156,13 +153,12 @@ def test_time_does_not_change_the_steady_state() -> None:
         "motion.start": "0 s",
     }
     steady, _ = run(zone({**changes, **STEADY}, TINY))
-    averaged = Reactor(zone(changes, TINY), MPI.COMM_SELF)
-    averaged.flows = steady.flows
-    averaged.flows.register(averaged.transport)
-    averaged.transport.concentration = steady.transport.concentration.copy()
-    averaged.bed.theta = steady.bed.theta.copy()
-    averaged.transport.advance(0, 0.0, 1.0)
-    before, after = steady.transport.concentration, averaged.transport.concentration
+    system = Reactor(zone(changes, TINY), MPI.COMM_SELF, flow=steady.flow).system
+    before = steady.system.transport.concentration
+    system.transport.concentration = before
+    system.coverage.become(steady.system.coverage.theta)
+    system.transport.advance(system.operators(system.velocity), 0.0, 1.0)
+    after = system.transport.concentration
     np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-9 * before.max())
 
 
@@ -196,11 +192,11 @@ def test_periodic_solids_between_two_precursors(
     """
     case = grid_case("cycle", dose, speed, COARSE).with_({"geometry.bed_inflow": "periodic"})
     _, straight = run(case)
-    monkeypatch.setattr(mpm.reactor.steady, "TRIES", 3)
+    monkeypatch.setattr(mpm.reactor.steady.solver, "TRIES", 3)
     reactor, result = run(case)
     np.testing.assert_allclose(result.coverage("bed", "OH"), straight.coverage("bed", "OH"), atol=1e-6)
     events = reactor.totals().surface.sum(axis=(1, 2))
-    sites = np.array([r.nu_site["OH"] for r in reactor.transport.surface.reactions])
+    sites = np.array([r.nu_site["OH"] for r in reactor.system.transport.reactions.surface.reactions])
     assert abs(events @ sites) < 1e-9 * np.abs(events).max()
     assert 0.5 < result.coverage("bed", "OH").mean() < 0.999
 
@@ -221,7 +217,7 @@ def test_a_coarser_mesh_first_changes_nothing(kind: str, monkeypatch: pytest.Mon
     """Fails when the steady state depends on whether it was reached from that of a coarser mesh, or when that saves no Newton step."""
     case = grid_case(kind, 2e-4, 1.3, COARSE)
     cold, alone = run(case, MPI.COMM_WORLD)
-    monkeypatch.setattr(mpm.reactor.coarsening, "FEWEST", 200)
+    monkeypatch.setattr(mpm.reactor.steady.coarsening, "FEWEST", 200)
     warm, after = run(case, MPI.COMM_WORLD)
     assert warm.steps < cold.steps
     assert_same_numbers({**alone.summary, "steps": warm.steps}, after.summary, 1e-8)
@@ -246,10 +242,10 @@ def test_failure_leaves_the_last_iterate(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Fails when a solve that stops ends otherwise than with exit 3, one line that says where and what to try, and the last iterate."""
-    monkeypatch.setattr(mpm.reactor.steady, "TRIES", 2)
-    monkeypatch.setattr(mpm.reactor.steady, "STEP_TRIES", 1)
-    monkeypatch.setattr(mpm.reactor.steady, "SETTLED", 0.0)  # no step of pseudo-time ends well
-    monkeypatch.setattr(mpm.reactor.steady, "SHORTEST_STEP", 0.1)
+    monkeypatch.setattr(mpm.reactor.steady.solver, "TRIES", 2)
+    monkeypatch.setattr(mpm.reactor.steady.solver, "STEP_TRIES", 1)
+    monkeypatch.setattr(mpm.reactor.steady.solver, "LOOSE", 0.0)  # no step of pseudo-time ends well
+    monkeypatch.setattr(mpm.reactor.steady.solver, "SHORTEST_STEP", 0.1)
     settings = [f"{key}={json.dumps(value)}" for key, value in {**TINY, **STEADY}.items()]
     arguments = [part for setting in settings for part in ("--set", setting)]
     status = main(["run", str(CASES / "single_zone.toml"), "-o", str(tmp_path / "run"), "-q", *arguments])
@@ -267,14 +263,14 @@ def test_failure_leaves_the_last_iterate(
 
 def test_no_number_is_written_that_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Fails when a linear system without a solution ends otherwise than with ConvergenceError, or leaves NaN in a field or number."""
-    solve = mpm.reactor.steady.DirectSolver.solve
+    solve = mpm.reactor.steady.solver.DirectSolver.solve
 
     def spoilt(self: Any, rhs: Any, solution: Any) -> None:
         solve(self, rhs, solution)
         if self.name == "steady state":
             solution.array[0] = np.nan
 
-    monkeypatch.setattr(mpm.reactor.steady.DirectSolver, "solve", spoilt)
+    monkeypatch.setattr(mpm.reactor.steady.solver.DirectSolver, "solve", spoilt)
     case = zone({**STEADY, "geometry.bed_inflow": "periodic"}, TINY)
     with pytest.raises(ConvergenceError, match="steady state: Newton stopped"):
         Reactor(case, MPI.COMM_SELF).run(tmp_path / "run")
@@ -290,7 +286,7 @@ def test_a_rank_without_a_part_of_the_bed() -> None:
     changes = {"geometry.layer.headspace.cells": 20, "geometry.layer.bed.cells": 1}
     case = zone({**STEADY, "geometry.layer.headspace.height": "60 mm"}, {**TINY, **changes})
     reactor, _ = run(case, MPI.COMM_WORLD)
-    mine = int(np.isin(reactor.bed.place, reactor.bed.moving_rows).sum())
+    mine = int(np.isin(reactor.system.coverage.place, reactor.system.coverage.moving_rows).sum())
     assert MPI.COMM_WORLD.allreduce(mine, op=MPI.MIN) == 0, "every rank has some; another mesh would test it"
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mpm.flow.problem import FaceFlow
+from mpm.flow.fields import FlowField
 from mpm.mesh.strip import Strip
 from mpm.reactor.reactor import Reactor
-from mpm.transport.coverage import Bed
+from mpm.transport.coverage import Coverage
 from mpm.transport.species import Transport
 
 from .cases import MPI, TINY, assert_laws, column_case, norm, rate, run, strip_case, zone
@@ -117,10 +117,10 @@ def test_drifting_gaussian() -> None:
             gas={"diffusivity": f"{diffusivity} m^2/s"},
         )  # fmt: skip
         strip = Strip(case, MPI.COMM_SELF)
-        transport = Transport(case, strip, Bed(case, strip))
+        transport = Transport(case, strip, Coverage(case, strip))
         assert transport.names == ("CH4",)
-        walls = np.full(len(strip.wall_cells("bottom")), v)
-        flow = transport.add_flow(FaceFlow(np.where(strip.faces.vertical_flow, v, u), walls, walls))
+        sides = np.array([v, u, u, v])[:, None] * np.ones(strip.local)
+        operators = transport.operators(FlowField(sides, np.zeros(strip.local)))
         x, y = middles(strip.grid.x)[strip.column], middles(strip.grid.y)[strip.row]
 
         def exact(t: float, x: np.ndarray = x, y: np.ndarray = y) -> np.ndarray:
@@ -135,9 +135,9 @@ def test_drifting_gaussian() -> None:
         transport.concentration = exact(0.0)[None, :]
         steps = 8 * (n // 20) ** 2
         for k in range(steps):
-            transport.advance(flow, k * end / steps, end / steps)
+            transport.advance(operators, k * end / steps, end / steps)
         errors.append(norm(transport.concentration[0] - exact(end)) / norm(exact(end)))
-        assert transport.concentration.min() >= -1e-14 * transport.largest_feed
+        assert transport.concentration.min() >= -1e-14 * transport.ports.largest_feed
     assert errors[-1] < 0.02, errors
     assert rate([1 / n for n in columns], errors) > 1.8, errors
 
@@ -242,11 +242,14 @@ def test_reactor_carries_a_coverage_step_once_around(gamma: float) -> None:
         "output.every": "1 s",
     }
     reactor = Reactor(zone(changes, TINY), MPI.COMM_SELF)
-    step = np.zeros((len(reactor.bed.rows), reactor.grid.columns))
+    step = np.zeros((len(reactor.system.coverage.rows), reactor.grid.columns))
     step[:, 3:11] = 1.0
-    reactor.bed.theta = reactor.bed.scatter.to_local(np.stack([1.0 - step.ravel(), step.ravel()]))
-    reactor.sites_initially = reactor.bed.content()
+    coverage = reactor.system.coverage
+    coverage.become(coverage.scatter.to_local(np.stack([1.0 - step.ravel(), step.ravel()])))
+    reactor.system.count_from_here()
     result = reactor.run(callback=assert_laws)
-    np.testing.assert_array_equal(reactor.bed.whole()[1], step)
-    assert reactor.bed.shifted == reactor.grid.columns
-    np.testing.assert_array_equal(result.coverage("bed", "OAl(CH3)2"), step[reactor.bed.moving_rows])
+    np.testing.assert_array_equal(reactor.system.coverage.whole()[1], step)
+    assert reactor.system.coverage.shifted == reactor.grid.columns
+    np.testing.assert_array_equal(
+        result.coverage("bed", "OAl(CH3)2"), step[reactor.system.coverage.moving_rows]
+    )

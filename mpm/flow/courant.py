@@ -36,16 +36,12 @@ def driving_speed(case: Case) -> float:
     return max(fastest, volume / min(outlet.width for outlet in geometry.outlets))
 
 
-def courant_number(case: Case, strip: Strip, velocities: Floats, step: float) -> float:
+def courant_number(strip: Strip, velocities: Floats, step: float) -> float:
     """Largest (|u_x|/dx + |u_y|/dy) step/eps of any cell, from the superficial `velocities` (4, cells) [m/s]; collective."""
     own = strip.owned
     bottom, left, right, top = np.abs(velocities[:, :own])
-    solids = [layer.material for layer in case.geometry.layers]
-    porosity = np.array([1.0 if s is None else s.porosity for s in solids])[
-        np.asarray(strip.grid.row_layer)[strip.row[:own]]
-    ]
     rate = np.maximum(left, right) / strip.grid.dx + np.maximum(bottom, top) / strip.height[:own]
-    return float(largest(strip.comm, [(rate / porosity).max(initial=0.0) * step])[0])
+    return float(largest(strip.comm, [(rate / strip.porosity[:own]).max(initial=0.0) * step])[0])
 
 
 def check_bounded(case: Case, strip: Strip, before: Floats, after: Floats, step: float) -> None:
@@ -61,7 +57,7 @@ def check_bounded(case: Case, strip: Strip, before: Floats, after: Floats, step:
     )
     if speed <= BOUND * expected:
         return
-    number = courant_number(case, strip, before, step) * min(1.0, expected / earlier if earlier else 1.0)
+    number = courant_number(strip, before, step) * min(1.0, expected / earlier if earlier else 1.0)
     steps = case.time.steps_per_cycle
     raise ConvergenceError(
         f"the flow diverges, gas at {speed:.3g} m/s where ports and motion give {expected:.3g} m/s: it passes {number:.2g} cells in a "

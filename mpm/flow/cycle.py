@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from mpm.errors import ConvergenceError
 from mpm.flow.courant import check_bounded
+from mpm.flow.fields import FlowField
 from mpm.flow.problem import FlowProblem
-from mpm.flow.steady import FlowField, steady_flow
+from mpm.flow.steady import steady_flow
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
 from mpm.parallel import largest
 
@@ -23,25 +24,22 @@ PERIODIC = 1e-6  # change of the velocities from one cycle to the next, relative
 CYCLE_LIMIT = 200
 
 
-def mean_field(fields: list[FlowField]) -> FlowField:
-    return FlowField(
-        np.mean([f.velocities for f in fields], axis=0), np.mean([f.pressure for f in fields], axis=0)
-    )
-
-
-def cycle_motions(bed: BedMotion, dt: float, phases: int) -> list[StepMotion]:
+def cycle_motions(bed_motion: BedMotion, dt: float, phases: int) -> list[StepMotion]:
     """Forcing of each step of a cycle in the periodic state (the second cycle: the first begins at the start of the motion)."""
-    offset = bed.vibration.period if phases > 1 else 0.0
-    return [step_motion(bed, offset + k * dt, offset + (k + 1) * dt) for k in range(phases)]
+    offset = bed_motion.vibration.period if phases > 1 else 0.0
+    return [step_motion(bed_motion, offset + k * dt, offset + (k + 1) * dt) for k in range(phases)]
 
 
-def mean_motion(bed: BedMotion) -> StepMotion:
+def mean_motion(bed_motion: BedMotion) -> StepMotion:
     """Forcing averaged over a cycle: the frame's means vanish, the bed's mean velocity remains."""
-    return StepMotion(bed.mean, 0.0, 0.0, 0.0)
+    return StepMotion(bed_motion.mean, 0.0, 0.0, 0.0)
 
 
 def periodic_flow(
-    problem: FlowProblem, bed: BedMotion, phases: int, watch: Callable[[int, float], None] | None = None
+    problem: FlowProblem,
+    bed_motion: BedMotion,
+    phases: int,
+    watch: Callable[[int, float], None] | None = None,
 ) -> list[FlowField]:
     """The cycle that the flow repeats, one field per step; `problem.dt` is a cycle over `phases`.
 
@@ -51,10 +49,10 @@ def periodic_flow(
     Periodicity is judged on velocities alone. `watch(cycle, change)` is called after every cycle. Raises ConvergenceError after
     CYCLE_LIMIT cycles, or as soon as the flow diverges because its steps are too long.
     """
-    motions = cycle_motions(bed, problem.dt, phases)
-    steady_flow(problem, mean_motion(bed))
+    motions = cycle_motions(bed_motion, problem.dt, phases)
+    steady_flow(problem, mean_motion(bed_motion))
     if phases == 1:
-        return [FlowField.of(problem)]
+        return [problem.field()]
     mean = StepMotion(
         float(np.mean([m.bed_velocity for m in motions])),
         float(np.mean([m.acceleration for m in motions])),
@@ -63,44 +61,43 @@ def periodic_flow(
     )
     # of the last cycle, as vectors; the next one takes their places, because two or their fields would be much to hold beside the factors
     states: list[Floats] = []
-    velocities = problem.velocities()
+    velocities = problem.space.velocities(problem.values)
     for cycle in range(CYCLE_LIMIT):
         convective_mean = problem.convective_force().duplicate()
-        state_mean = np.zeros_like(problem.state.x.array)
+        state_mean = np.zeros_like(problem.values)
         change = speed = 0.0
         for phase, motion in enumerate(motions):
             force = problem.convective_force()
             convective_mean.axpy(1.0 / phases, force)
             problem.step(motion, force)
-            before, velocities = velocities, problem.velocities()
+            before, velocities = velocities, problem.space.velocities(problem.values)
             check_bounded(problem.case, problem.strip, before, velocities, problem.dt)
-            state_mean += problem.state.x.array / phases
-            state = problem.state.x.array.copy()
+            state_mean += problem.values / phases
+            state = problem.values.copy()
             if cycle == 0:
                 states.append(state)
                 continue
             speed = max(speed, np.abs(velocities).max(initial=0.0))
-            change = max(change, np.abs(velocities - problem.velocities(states[phase])).max(initial=0.0))
+            change = max(
+                change, np.abs(velocities - problem.space.velocities(states[phase])).max(initial=0.0)
+            )
             states[phase] = state
         change = _relative(problem, change, speed) if cycle else np.inf
         if watch is not None:
             watch(cycle, change)
         if change < PERIODIC:
-            return [_field(problem, state) for state in states]
-        last = problem.state.x.array.copy()
-        problem.state.x.array[:] = state_mean
+            problem.values[:] = states[-1]
+            return [problem.field_of(state) for state in states]
+        last = problem.values.copy()
+        problem.values[:] = state_mean
         problem.newton_update(problem.steady_residual(mean, convective_mean))
-        problem.state.x.array[:] += last - state_mean
+        problem.values[:] += (
+            last - state_mean
+        )  # the mean corrected; the last phase keeps its distance from it
         convective_mean.destroy()
     raise ConvergenceError(
         f"periodic flow: velocities still change by {change:.3g} per cycle after {CYCLE_LIMIT} cycles"
     )
-
-
-def _field(problem: FlowProblem, state: Floats) -> FlowField:
-    """The fields of a stored state; leaves it in `problem.state`."""
-    problem.state.x.array[:] = state
-    return FlowField.of(problem)
 
 
 def _relative(problem: FlowProblem, change: float, speed: float) -> float:

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.flow.problem import boundary_flows, face_flow
-from mpm.flow.steady import FlowField
-from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
+from mpm.flow.fields import FlowField, boundary_flows, face_flow
+from mpm.mesh.strip import BOTTOM, TOP, Strip
 from mpm.parallel import total
 
 if TYPE_CHECKING:
@@ -51,11 +50,8 @@ def layer_velocity(strip: Strip, field: FlowField, layer: str) -> list[float]:
     """Superficial velocity of the gas in a layer, mean over its volume, [u_x, u_y] [m/s]."""
     own, rows = strip.owned, strip.grid.layer_rows(layer)
     inside = (strip.row[:own] >= rows.start) & (strip.row[:own] < rows.stop)
-    u, weights = field.velocities[:, :own][:, inside], strip.volume[:own][inside]
-    along, up, volume = total(
-        strip.comm,
-        [0.5 * (u[LEFT] + u[RIGHT]) @ weights, 0.5 * (u[BOTTOM] + u[TOP]) @ weights, weights.sum()],
-    )
+    weights = np.where(inside, strip.volume[:own], 0.0)
+    along, up, volume = total(strip.comm, [*(field.in_cells(own) @ weights), weights.sum()])
     return [float(along / volume), float(up / volume)]
 
 
@@ -88,7 +84,7 @@ def flux_profiles(strip: Strip, field: FlowField) -> dict[str, Floats]:
     `x` of the columns' centres [m], then `velocity_y.<layer>` (columns,) [m/s], superficial.
     """
     own, grid = strip.owned, strip.grid
-    profiles = {"x": 0.5 * (grid.x[1:] + grid.x[:-1])}
+    profiles = {"x": grid.centres}
     for name in grid.layer_names[:-1]:
         top = strip.row[:own] == grid.layer_rows(name).stop - 1
         upwards = np.bincount(strip.column[:own][top], field.velocities[TOP, :own][top], grid.columns)

@@ -6,16 +6,13 @@ velocities: a residual says little, because the drag of a tight solid outweighs 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from mpm.errors import ConvergenceError
+from mpm.flow.fields import FlowField
 from mpm.flow.problem import FlowProblem
 from mpm.motion.kinematics import REST, StepMotion
 
-Floats = NDArray[np.float64]
 CONVERGED = 1e-8  # last change of a velocity, relative to the fastest; the next one would be smaller by 1e-4 or better
 # change that is accepted once it no longer shrinks: what rounding of the pressure leaves, 1e-8 where a powder of a micron holds back 1 bar
 ROUNDING = 1e-5
@@ -24,20 +21,8 @@ SHARE_LIMIT = 12  # and from a flow with less convection
 FIRST_SHARE, LEAST_SHARE = 0.25, 1.0 / 64.0  # steps of the share of convection
 
 
-@dataclass(frozen=True, eq=False)
-class FlowField:
-    """Velocities at the bottom, left, right and top of every local cell (4, cells) [m/s] and pressure (cells,) [Pa]."""
-
-    velocities: Floats
-    pressure: Floats
-
-    @classmethod
-    def of(cls, problem: FlowProblem) -> FlowField:
-        return cls(problem.velocities(), problem.pressure().copy())
-
-
 def steady_flow(problem: FlowProblem, motion: StepMotion = REST) -> FlowField:
-    """Steady flow with convection under constant forcing; leaves it in `problem.state`.
+    """Steady flow with convection under constant forcing; leaves it in `problem`.
 
     Newton's method from the creeping flow, with the factored creeping operator as preconditioner, so that one factor serves. Where that
     does not arrive (ports at a Reynolds number of a hundred), the convection grows in steps. Raises ConvergenceError.
@@ -47,14 +32,14 @@ def steady_flow(problem: FlowProblem, motion: StepMotion = REST) -> FlowField:
         _newton(problem, motion, LIMIT)
     except ConvergenceError:
         _grow(problem, motion)
-    return FlowField.of(problem)
+    return problem.field()
 
 
 def _creep(problem: FlowProblem, motion: StepMotion) -> None:
     """The flow without convection."""
     force = problem.convective_force()
     force.set(0.0)
-    problem.settle(motion, force)
+    problem.solve_steady(motion, force)
 
 
 def _newton(problem: FlowProblem, motion: StepMotion, limit: int, exact: bool = False) -> None:
@@ -76,13 +61,13 @@ def _grow(problem: FlowProblem, motion: StepMotion) -> None:
     share, step = 0.0, FIRST_SHARE
     try:
         while share < 1.0:
-            aim, before = min(share + step, 1.0), problem.state.x.array.copy()
+            aim, before = min(share + step, 1.0), problem.values.copy()
             problem.convection_share.value = aim
             try:
                 _newton(problem, motion, SHARE_LIMIT, exact=True)
                 share, step = aim, 1.5 * step
             except ConvergenceError as error:
-                problem.state.x.array[:] = before
+                problem.values[:] = before
                 step *= 0.5
                 if step < LEAST_SHARE:
                     raise ConvergenceError(

@@ -7,11 +7,13 @@ is neither u nor u/eps but the total volume flux of gas and solids, U = u + (1-e
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
+from numpy.typing import NDArray
 from ufl import Form, avg, conditional, div, dot, dS, ds, dx, grad, inner, jump, lt
 
 from mpm.mesh.strip import Strip
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.materials import Material
 
+Floats = NDArray[np.float64]
 Expr = Any  # of UFL, which has no types
 
 
@@ -44,41 +47,36 @@ class Medium:
 
     @classmethod
     def from_case(cls, case: Case, strip: Strip) -> Medium:
-        mu = case.gas.viscosity
-        layers = [case.geometry.layers[i] for i in strip.grid.row_layer]
-        solids = [layer.material for layer in layers]
-
-        def rows(name: str, values: list[float]) -> dolfinx.fem.Function:
-            return strip.cell_function(np.asarray(values), name)
-
-        return cls(
-            density=case.gas.density,
-            porosity=rows("porosity", [s.porosity if s else 1.0 for s in solids]),
-            viscosity=rows("viscosity", [mu * s.viscosity_ratio if s else mu for s in solids]),
-            resistance_x=rows("resistance_x", [mu / s.permeability[0] if s else 0.0 for s in solids]),
-            resistance_y=rows("resistance_y", [mu / s.permeability[1] if s else 0.0 for s in solids]),
-            moving_solid=rows(
-                "moving_solid",
-                [1.0 - s.porosity if s and l.moving else 0.0 for s, l in zip(solids, layers, strict=True)],
-            ),
-            width=strip.grid.dx,
-            half_height=rows(
-                "half_height", [shear_distance(h, s) for h, s in zip(strip.grid.dy, solids, strict=True)]
-            ),
-        )
+        """The medium at the gas's own viscosity and density."""
+        grid, mu = strip.grid, case.gas.viscosity
+        porosity = grid.per_row(lambda solid: solid.porosity, gas=1.0)
+        rows = {
+            "porosity": porosity,
+            "viscosity": grid.per_row(lambda solid: mu * solid.viscosity_ratio, gas=mu),
+            "resistance_x": grid.per_row(lambda solid: mu / solid.permeability[0], gas=0.0),
+            "resistance_y": grid.per_row(lambda solid: mu / solid.permeability[1], gas=0.0),
+            "moving_solid": np.where(grid.moving, 1.0 - porosity, 0.0),
+            "half_height": shear_distance(grid.dy, grid.per_row(brinkman_length, gas=np.inf)),
+        }
+        functions = {name: strip.cell_function(values, name) for name, values in rows.items()}
+        return cls(density=case.gas.density, width=grid.dx, **functions)
 
 
-def shear_distance(height: float, solid: Material | None) -> float:
-    """Half the height of a row [m]; in a solid l tanh(height / (2 l)), with l = sqrt(K_x mu_e/mu).
+def brinkman_length(solid: Material) -> float:
+    """l = sqrt(K_x mu_e/mu) [m]: how far into a solid the shear of the gas beside it reaches."""
+    return math.sqrt(solid.permeability[0] * solid.viscosity_ratio)
 
-    Above and below a solid the gas is at rest with it beyond the Brinkman length l, microns for a powder and far less than a row. Half
-    the row would put the no-slip plane at the centre of the solid's outermost row, an error of first order. The length that is exact
-    for thin and for high rows keeps second order where l is resolved, and places the plane right where it is not.
+
+def shear_distance(heights: Floats, brinkman: Floats) -> Floats:
+    """Boundary-layer thickness of a row as the shear across its faces feels it [m]: l tanh(height / (2 l)), l the Brinkman length.
+
+    That is half the height in gas, where l is infinite, and l where rows are far higher, as in a powder, whose l is microns: half the row
+    would put the no-slip plane at the centre of its outermost row, an error of first order. In between it is exact for one row and keeps
+    second order.
     """
-    if solid is None:
-        return 0.5 * height
-    length = float(np.sqrt(solid.permeability[0] * solid.viscosity_ratio))
-    return float(length * np.tanh(0.5 * height / length))
+    solid = np.isfinite(brinkman)
+    length = np.where(solid, brinkman, 1.0)
+    return np.where(solid, length * np.tanh(0.5 * heights / length), 0.5 * heights)
 
 
 def inertia(u: Expr, v: Expr, m: Medium) -> Form:

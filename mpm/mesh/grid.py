@@ -124,7 +124,9 @@ class Grid:
 
     def overlap(self, port: Span) -> Floats:
         """Length of each column's wall facet that `port` covers [m]; sums to the width of the port."""
-        return np.clip(np.minimum(self.x[1:], port.x1) - np.maximum(self.x[:-1], port.x0), 0.0, None)
+        return np.asarray(
+            np.clip(np.minimum(self.x[1:], port.x1) - np.maximum(self.x[:-1], port.x0), 0.0, None)
+        )
 
     def opening(self, port: Span) -> NDArray[np.bool_]:
         """Columns whose wall facet is open: at least half of it covered by the port, or the one it covers most."""

@@ -123,7 +123,7 @@ def read_msh(case: Case, path: Path) -> QuadMesh:
 
 
 @contextmanager
-def _gmsh_model(title: str) -> Iterator:
+def _gmsh_model(title: str) -> Iterator[Any]:
     import gmsh
 
     gmsh.initialize(interruptible=False)  # the default takes SIGINT away from Python
@@ -188,7 +188,7 @@ def _draw(gmsh: Any, case: Case, grid: Grid) -> None:
         gmsh.model.addPhysicalGroup(1, curves, name=name)
 
 
-def _pairs(items: list) -> list[tuple]:
+def _pairs[Item](items: list[Item]) -> list[tuple[Item, Item]]:
     return list(itertools.pairwise(items))
 
 
@@ -196,7 +196,7 @@ def _element_nodes(gmsh: Any, dim: int, entity: int, kind: int) -> NDArray[np.in
     types, _, nodes = gmsh.model.mesh.getElements(dim, entity)
     if list(types) != [kind]:
         raise InputError(f"gmsh made elements of type {list(types)} where only type {kind} was asked for")
-    return nodes[0].astype(np.int64).reshape(-1, 4 if kind == QUADRILATERAL else 2)
+    return np.asarray(nodes[0], dtype=np.int64).reshape(-1, 4 if kind == QUADRILATERAL else 2)
 
 
 def _in_grid_order(

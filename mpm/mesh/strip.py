@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 Ints = NDArray[np.int64]
 BOTTOM, LEFT, RIGHT, TOP = range(4)  # local facet numbers of a quadrilateral with tensor-ordered corners
+TAG = 1304  # of the messages in which ranks tell each other which nodes they share; any number that no other exchange has
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,26 +52,33 @@ class Strip:
     grid order.
     """
 
-    def __init__(self, case: Case, comm: MPI.Comm, quads: QuadMesh | None = None):
+    def __init__(self, case: Case, comm: MPI.Comm):
         self.comm = comm
         self.grid = grid = Grid.from_case(case)
-        if quads is None and is_root(comm):
-            quads = build_mesh(case)
-        self.mesh = _periodic_mesh(grid, quads, comm)
+        self.mesh = _periodic_mesh(grid, build_mesh(case) if is_root(comm) else None, comm)
         topology = self.mesh.topology
         cells = topology.index_map(2)
-        self.owned = cells.size_local
-        self.local = cells.size_local + cells.num_ghosts
-        self.cell = topology.original_cell_index.astype(np.int64)
-        self.global_cell = cells.local_to_global(np.arange(self.local, dtype=np.int32)).astype(np.int64)
+        self.owned: int = cells.size_local
+        self.local: int = cells.size_local + cells.num_ghosts
+        self.cell: Ints = topology.original_cell_index.astype(np.int64)
+        self.global_cell: Ints = cells.local_to_global(np.arange(self.local, dtype=np.int32)).astype(np.int64)
         self.row, self.column = np.divmod(self.cell, grid.columns)
         topology.create_connectivity(2, 1)
         topology.create_connectivity(1, 2)
-        self.facets = topology.connectivity(2, 1).array.reshape(-1, 4).astype(np.int64)
+        self.facets: Ints = topology.connectivity(2, 1).array.reshape(-1, 4).astype(np.int64)
         self.scatter = Scatter(comm, self.cell[: self.owned], grid.cells)
+        self.faces = self._faces()
+        self._measure()
+
+    def _measure(self) -> None:
+        """Every length and volume that others use, local cells: `height`, `volume`, `gas_volume` (the pores'), `porosity`, and the
+        `face_length` of `faces` [m, m2 per metre of depth]."""
+        grid = self.grid
         self.height = grid.dy[self.row]
         self.volume = self.height * grid.dx
-        self.faces = self._faces()
+        self.porosity = grid.per_row(lambda solid: solid.porosity, gas=1.0)[self.row]
+        self.gas_volume = self.porosity * self.volume
+        self.face_length = np.where(self.faces.vertical_flow, grid.dx, self.height[self.faces.behind])
 
     def _faces(self) -> Faces:
         """Interior faces that touch an own cell."""
@@ -96,7 +104,7 @@ class Strip:
 
     def wall_facets(self, side: str) -> Ints:
         """The wall facets of `wall_cells(side)`, in the same order."""
-        return self.facets[self.wall_cells(side), BOTTOM if side == "bottom" else TOP]
+        return np.asarray(self.facets[self.wall_cells(side), BOTTOM if side == "bottom" else TOP])
 
     def end_facets(self) -> Ints:
         """Facets of own cells at the left and right ends; none where the strip is periodic."""
@@ -132,7 +140,7 @@ def _periodic_mesh(grid: Grid, quads: QuadMesh | None, comm: MPI.Comm) -> dolfin
         4 * own.size_local,
         (4 * own.ghosts[:, None] + four).ravel().astype(np.int64),
         np.repeat(own.owners, 4).astype(np.int32),
-        1304,  # any tag of our own
+        TAG,
     )
     count = own.size_local + own.num_ghosts
     row, column = np.divmod(topology.original_cell_index, grid.columns)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,20 +21,26 @@ from mpm.case.sources import merge, read_toml
 from mpm.errors import InputError
 from mpm.files import read_text
 from mpm.output.directory import RunDirectory
-from mpm.parallel import is_root, on_root, total
-from mpm.reactor.sequence import March, Replay, unpack
-from mpm.report.records import Totals
+from mpm.parallel import on_root
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-    from mpm.reactor.reactor import Reactor
+    from mpm.reactor.course import Course
 
 Arrays = dict[str, NDArray[Any]]
 State = tuple[Arrays, dict[str, Any]]
-FORMAT = 2  # of the states that this version writes and reads; another number for every change of what an entry means
+Identity = dict[str, Any]
+BEFORE = (
+    "out",
+    "out_volume",
+    "back_volume",
+    "surface",
+    "slid",
+)  # of the latest output, for what is reported since then
+FORMAT = 3  # of the states that this version writes and reads; another number for every change of what an entry means
 
 
-def identity(case: Case) -> dict[str, Any]:
+def identity(case: Case) -> Identity:
     """By what a state knows its case: digests of all that determines the results but for the time at which they end and are looked at.
 
     The mesh follows from the case; files count with their content (a mechanism's tables and a shared geometry are in the case).
@@ -56,89 +63,30 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def write(reactor: Reactor, directory: RunDirectory) -> None:
-    """Write the state of `reactor`; collective."""
-    arrays, meta = pack(reactor)
-    on_root(reactor.comm, lambda: directory.write_checkpoint(arrays, meta))
+def write(course: Course, known: Identity, directory: RunDirectory) -> None:
+    """Write the state of a run, which is `known` by its case's identity; collective."""
+    arrays, meta = pack(course)
+    on_root(course.comm, lambda: directory.write_checkpoint(arrays, {**known, **meta}))
 
 
-def pack(reactor: Reactor) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays (on rank 0) and plain numbers of the state."""
-    transport, bed, flows = reactor.transport, reactor.bed, reactor.flows
-    assert flows is not None
-    ledger, scatter = transport.ledger, reactor.strip.scatter
-    gathered = {
-        "concentration": scatter.to_root(transport.concentration),
-        "gas_events": scatter.to_root(ledger.gas_events),
-        "flow": scatter.to_root(flows.stored()),
-        "theta": bed.scatter.to_root(bed.theta),
-        "surface_events": bed.scatter.to_root(ledger.surface_events),
-    }
-    arrays = {
-        **{name: values for name, values in gathered.items() if values is not None},
-        **{f"ledger_{name}": total(reactor.comm, getattr(ledger, name)) for name in SUMMED},
-        "passed": bed.passed,
-        "left": np.asarray(bed.left),
-        "right": np.asarray(bed.right),
-        "sites_initially": reactor.sites_initially,
-    }
-    if isinstance(flows, Replay) and flows.dispersion is not None:
-        dispersion = scatter.to_root(flows.dispersion[:, :, : reactor.strip.owned])
-        arrays |= {"dispersion": dispersion} if dispersion is not None else {}
-    if reactor.before is not None:
-        arrays |= {f"before_{name}": np.asarray(getattr(reactor.before, name)) for name in BEFORE}
-    meta = {
-        **reactor.identity,
-        "time": reactor.time,
-        "steps": reactor.steps,
-        "rows": len(reactor.rows),
-        "wall": reactor.wall,
-        "distance": bed.distance,
-        "shifted": bed.shifted,
-        "marched": flows.done if isinstance(flows, March) else -1,
-    }
-    return arrays, meta
+def pack(course: Course) -> State:
+    """Arrays (those that are gathered on rank 0 alone) and plain numbers of the state; collective."""
+    parts = course.system.stored()
+    if course.before is not None:
+        parts |= {f"before.{name}": getattr(course.before, name) for name in BEFORE}
+    arrays = {name: np.asarray(value) for name, value in parts.items() if value is not None}
+    clock = course.clock
+    return arrays, {"time": clock.time, "steps": clock.steps, "wall": clock.wall, "rows": len(course.rows)}
 
 
-SUMMED = ("fed", "out", "back", "out_volume", "back_volume")
-BEFORE = (
-    "out",
-    "out_volume",
-    "back_volume",
-    "surface",
-    "slid",
-)  # of the latest output, for what is reported since then
-
-
-def restore(reactor: Reactor, arrays: Arrays, meta: dict[str, Any]) -> None:
-    """Put `reactor`, freshly built for the same case, into the stored state; collective."""
-    transport, bed, strip = reactor.transport, reactor.bed, reactor.strip
-    ledger = transport.ledger
-    transport.concentration = strip.scatter.to_local(arrays["concentration"])
-    ledger.gas_events = strip.scatter.to_local(arrays["gas_events"])
-    ledger.surface_events = bed.scatter.to_local(arrays["surface_events"])
-    bed.theta = bed.scatter.to_local(arrays["theta"])
-    for name in SUMMED:  # sums over ranks: rank 0 carries them on
-        values = arrays[f"ledger_{name}"]
-        setattr(ledger, name, values if is_root(reactor.comm) else np.zeros_like(values))
-    bed.passed = arrays["passed"]
-    bed.left, bed.right = list(arrays["left"]), list(arrays["right"])
-    bed.distance, bed.shifted = meta["distance"], meta["shifted"]
-    reactor.sites_initially = arrays["sites_initially"]
-    reactor.time, reactor.steps, reactor.wall_before = meta["time"], meta["steps"], meta["wall"]
-    fields = unpack(strip, arrays["flow"])
-    if meta["marched"] >= 0:
-        march = March(reactor.case, strip, reactor.motion, reactor.schedule)
-        march.restore(fields, meta["marched"])
-        reactor.flows = march
-    else:
-        dispersion = arrays["dispersion"][:, :, strip.cell] if "dispersion" in arrays else None
-        reactor.flows = Replay(strip, fields, reactor.schedule.resting_steps > 0, dispersion)
-    reactor.flows.register(transport)
-    if "before_out" in arrays:
-        now = reactor.totals()
-        then = {name: arrays[f"before_{name}"] for name in BEFORE}
-        reactor.before = Totals(**{**vars(now), **then, "slid": float(then["slid"])})
+def restore(course: Course, arrays: Arrays, meta: dict[str, Any]) -> None:
+    """Put a fresh `course` of the same case into the stored state, but for its rows; collective."""
+    clock = course.clock
+    clock.time, clock.steps, clock.wall_before = meta["time"], meta["steps"], meta["wall"]
+    course.system.restore({k: v for k, v in arrays.items() if not k.startswith("before.")}, clock.steps)
+    if "before.out" in arrays:
+        then: dict[str, Any] = {name: arrays[f"before.{name}"] for name in BEFORE}
+        course.before = replace(course.system.totals(), **{**then, "slid": float(then["slid"])})
 
 
 def check_same_case(directory: RunDirectory, case: Case, state: State | None) -> None:

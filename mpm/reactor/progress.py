@@ -6,23 +6,22 @@ Only rank 0 prints.
 from __future__ import annotations
 
 import logging
-import time as clock
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from rich.status import Status
 from rich.text import Text
 
 from mpm.parallel import is_root
+from mpm.reactor.clock import Clock
 from mpm.reactor.notebook import LiveLine, in_notebook
 from mpm.screen import duration, say, screen, spinner
 
-if TYPE_CHECKING:
-    from mpm.reactor.reactor import Reactor
-
+from mpi4py import MPI  # isort: skip  (after the solver's own)
 
 FLOW = "finding the flow of the gas"
 """Said at once wherever it goes: it may take minutes."""
@@ -54,20 +53,21 @@ def log_file(log: logging.Logger, path: Path | None) -> Iterator[None]:
 
 
 class Progress:
-    """Shows how `reactor` gets on: a line that renews itself on a terminal and in a notebook, a line every ten seconds elsewhere.
+    """Shows how a run gets on, by its `clock`: a line that renews itself on a terminal and in a notebook, a line every ten seconds
+    elsewhere.
 
     shown: None for where somebody watches.
     """
 
-    def __init__(self, reactor: Reactor, shown: bool | None):
-        self.reactor = reactor
+    def __init__(self, clock: Clock, comm: MPI.Comm, shown: bool | None):
+        self.clock = clock
         self.console = screen(stderr=True)
         live = self.console.is_terminal or in_notebook()
-        self.shown = is_root(reactor.comm) and (live if shown is None else shown)
+        self.shown = is_root(comm) and (live if shown is None else shown)
         self.interval = 0.2 if live else 10.0
         self.status: Status | LiveLine | None = None
         self.first: tuple[float, int] | None = None
-        self.printed = clock.monotonic()
+        self.printed = time.monotonic()
 
     def __enter__(self) -> Self:
         if self.shown and in_notebook():
@@ -103,19 +103,19 @@ class Progress:
             return
         if self.status is not None:
             self.status.update(Text(text))
-        elif clock.monotonic() - self.printed > self.interval or text == FLOW:
-            self.printed = clock.monotonic()
+        elif time.monotonic() - self.printed > self.interval or text == FLOW:
+            self.printed = time.monotonic()
             self.console.print(text)
 
     def advance(self) -> None:
         """A step has been done."""
         if self.first is None:
-            self.first = (clock.monotonic(), self.reactor.steps)
-        if self.shown and clock.monotonic() - self.printed > self.interval:
+            self.first = (time.monotonic(), self.clock.steps)
+        if self.shown and time.monotonic() - self.printed > self.interval:
             self._print()
 
     def _print(self, force: bool = False) -> None:
-        self.printed = clock.monotonic()
+        self.printed = time.monotonic()
         text = self.line()
         if self.status is not None:
             self.status.update(Text(text))
@@ -126,19 +126,18 @@ class Progress:
         """One line of numbers; empty before the first step."""
         if self.first is None:
             return ""
-        reactor = self.reactor
-        done = reactor.steps - self.first[1]
-        elapsed = clock.monotonic() - self.first[0]
+        clock = self.clock
+        done = clock.steps - self.first[1]
+        elapsed = time.monotonic() - self.first[0]
         speed = done / elapsed if elapsed > 0.0 else 0.0
-        balances = [value for name, value in reactor.numbers.items() if name.startswith("balance.")]
-        to_do = reactor.schedule.steps - reactor.steps
+        to_do = clock.all_steps - clock.steps
         remaining = [f"{duration(to_do / speed)} left"] if speed and to_do else ["done"] if not to_do else []
         return ", ".join(
             [
-                f"{reactor.time:.{2 if reactor.time < 1e3 else 1}f} of {reactor.case.time.end:g} s",
-                f"step {reactor.steps}",
+                f"{clock.time:.{2 if clock.time < 1e3 else 1}f} of {clock.end:g} s",
+                f"step {clock.steps}",
                 f"{speed:.1f} steps/s",
                 *remaining,
-                f"balances to {max(balances, default=0.0):.0e}",
+                f"balances to {clock.worst_balance:.0e}",
             ]
         )

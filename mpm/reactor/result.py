@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mpm.errors import InputError
+from mpm.output.history import columns_of
 from mpm.output.results import LastInstant, Run, load_run
 from mpm.page import report
 from mpm.parallel import on_root
@@ -16,21 +17,19 @@ from mpm.report.verdict import verdict
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mpm.reactor.reactor import Reactor
+    from mpm.reactor.course import Course
 
 
 class Result:
     """What a run gives: `summary` (as summary.json), `history` (columns of history.csv), and fields of the last instant."""
 
-    def __init__(self, reactor: Reactor, summary: dict[str, Any], directory: Path | None):
+    def __init__(self, course: Course, summary: dict[str, Any], directory: Path | None):
         self.summary, self.directory = summary, directory
-        self.case, self.time = reactor.case, reactor.time
-        self.history = reactor.history()
-        self.fields = reactor.fields
-        self.field = reactor.field
-        self.coverage = reactor.coverage
-        self.grid = reactor.grid
-        self._comm = reactor.comm
+        system = course.system
+        self.case, self.time, self.grid = course.case, course.clock.time, system.grid
+        self.history = columns_of(course.rows)
+        self.fields, self.field, self.coverage = system.fields, system.field, system.coverage_of
+        self._comm = course.comm
 
     def plot(self, name: str | None = None, **options: Any) -> Figure:
         """A picture as `mpm.load_run(directory).plot(name)` draws it; of a run without a directory the fields are those of its end.

@@ -1,46 +1,34 @@
-"""summary.json and the rows of history.csv of a reactor: its records, handed to the table of reported numbers (`mpm.report.contents`)."""
+"""summary.json of a run: its records and circumstances, handed to the table of reported numbers (`mpm.report.contents`)."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mpm.flow.numbers import flow_numbers
-from mpm.mesh.grid import Grid
 from mpm.numerics.versions import versions
 from mpm.parallel import on_root
-from mpm.report.contents import row_of, summary_of
-from mpm.report.records import Records, State, Totals
+from mpm.report.contents import summary_of
 from mpm.revision import revision
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case
-    from mpm.reactor.reactor import Reactor
+    from mpm.reactor.course import Course
 
 
-def summarise(reactor: Reactor, status: str, wall: float) -> dict[str, Any]:
+def summarise(course: Course, status: str) -> dict[str, Any]:
     """The whole of summary.json on every rank; collective."""
-    flow = {} if reactor.flows is None else flow_numbers(reactor.case, reactor.strip, reactor.flows.mean())
-    return summary_of(
-        Records(
-            case=reactor.case,
-            grid=reactor.grid,
-            time=reactor.time,
-            totals=reactor.totals(),
-            state=reactor.state(),
-            status=status,
-            ranks=reactor.comm.size,
-            steps=reactor.steps,
-            wall=wall,
-            program=on_root(reactor.comm, revision),
-            versions=versions(),
-            flow=flow,
-            latest=reactor.numbers,
-        )
+    system = course.system
+    mean = system.flow.sequence.mean() if system.has_flow else None
+    records = replace(
+        course.records(),
+        before=None,
+        status=status,
+        ranks=course.comm.size,
+        steps=course.clock.steps,
+        wall=course.clock.wall,
+        program=on_root(course.comm, revision),
+        versions=versions(),
+        flow={} if mean is None else flow_numbers(course.case, system.strip, mean),
+        latest=course.numbers,
     )
-
-
-def history_row(
-    case: Case, grid: Grid, time: float, totals: Totals, state: State, before: Totals | None
-) -> dict[str, float]:
-    """One row of history.csv, flat dotted names; outlets and film tell what has passed since the row before."""
-    return row_of(Records(case, grid, time, totals, state, before))
+    return summary_of(records)

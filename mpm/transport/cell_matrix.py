@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,96 +13,111 @@ from mpm.numerics.linear import KrylovSolver
 from mpm.transport.fluxes import FluxOperator
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class FacePattern:
+    """Which own cell is coupled to which neighbour, face by face from either side, and what flux operators enter there."""
+
+    def __init__(self, strip: Strip):
+        faces, self.own = strip.faces, strip.owned
+        self._behind = np.flatnonzero(faces.behind < self.own)  # faces with an own cell behind them
+        self._ahead = np.flatnonzero(faces.ahead < self.own)
+        self._cell_behind, self._cell_ahead = faces.behind[self._behind], faces.ahead[self._ahead]
+        self.cells = np.concatenate([self._cell_behind, self._cell_ahead])
+        self.neighbours = np.concatenate([faces.ahead[self._behind], faces.behind[self._ahead]])
+
+    def coupling(self, operator: FluxOperator) -> Floats:
+        """Entries that couple `cells` to `neighbours`, (pairs,) [m2/s]."""
+        return np.concatenate([-operator.from_ahead[self._behind], -operator.from_behind[self._ahead]])
+
+    def diagonal(self, operator: FluxOperator) -> Floats:
+        """What leaves each own cell per concentration, through faces and ports, (own,) [m2/s]."""
+        diagonal = np.bincount(self._cell_behind, operator.from_behind[self._behind], self.own)
+        diagonal += np.bincount(self._cell_ahead, operator.from_ahead[self._ahead], self.own)
+        for port in (*operator.inlets.values(), *operator.outlets.values()):
+            np.add.at(diagonal, port.cells, port.out)
+        return diagonal
 
 
 class CellMatrix:
-    """A PETSc matrix over own cells with `b` unknowns per cell: face fluxes off the diagonal, dense blocks on it."""
+    """A PETSc matrix over own cells with `unknowns` per cell: face fluxes off the diagonal, dense blocks on it."""
 
-    def __init__(self, strip: Strip, b: int):
-        faces, own = strip.faces, strip.owned
-        number = strip.global_cell
-        self.b, self.own = b, own
-        self.from_behind, self.from_ahead = (
-            np.flatnonzero(faces.behind < own),
-            np.flatnonzero(faces.ahead < own),
-        )
-        rows_behind, rows_ahead = faces.behind[self.from_behind], faces.ahead[self.from_ahead]
-        to_ahead, to_behind = faces.ahead[self.from_behind], faces.behind[self.from_ahead]
-        i, j = np.divmod(np.arange(b * b), b)
-        block_rows = (number[:own, None] * b + i).ravel()
-        block_columns = (number[:own, None] * b + j).ravel()
-        rows = [number[rows_behind] * b + k for k in range(b)] + [
-            number[rows_ahead] * b + k for k in range(b)
-        ]
-        columns = [number[to_ahead] * b + k for k in range(b)] + [number[to_behind] * b + k for k in range(b)]
+    def __init__(self, strip: Strip, unknowns: int):
+        self.pattern = pattern = FacePattern(strip)
+        number, own = strip.global_cell, strip.owned
+        each = np.arange(unknowns)
+        i, j = np.divmod(np.arange(unknowns * unknowns), unknowns)
+        rows = (number[pattern.cells] * unknowns + each[:, None]).ravel()
+        columns = (number[pattern.neighbours] * unknowns + each[:, None]).ravel()
+        block_rows = (number[:own, None] * unknowns + i).ravel()
+        block_columns = (number[:own, None] * unknowns + j).ravel()
         self.matrix = PETSc.Mat().create(strip.comm)
-        self.matrix.setSizes(((own * b, None), (own * b, None)))
+        self.matrix.setSizes(((own * unknowns, None), (own * unknowns, None)))
         self.matrix.setType("aij")
         self.matrix.setPreallocationCOO(
-            np.concatenate([*rows, block_rows]).astype(PETSc.IntType),
-            np.concatenate([*columns, block_columns]).astype(PETSc.IntType),
+            np.concatenate([rows, block_rows]).astype(PETSc.IntType),
+            np.concatenate([columns, block_columns]).astype(PETSc.IntType),
         )
-        self.count = b * (len(rows_behind) + len(rows_ahead))
-        self.values = np.zeros(self.count + own * b * b)
-        self._diagonal = self.matrix.createVecLeft() if b == 1 else None
+        self._couplings = len(rows)
+        self._values = np.zeros(len(rows) + own * unknowns * unknowns)
+        self._diagonal = self.matrix.createVecLeft() if unknowns == 1 else None
+        self._versions: list[int] = []  # of the operators in `_values`
+        self._outflow = np.empty((0, own))
         self._holds_fluxes = False
-        self._diagonal_faces = (rows_behind, rows_ahead)
 
-    def set_fluxes(self, operators: list[FluxOperator]) -> Floats:
-        """Enter the face fluxes of one operator per unknown; returns what they add to the diagonal, (b, own) [m2/s]."""
-        behind, ahead = self.from_behind, self.from_ahead
-        diagonals = {}
-        for op in operators:
-            if id(op) not in diagonals:
-                diagonal = np.bincount(self._diagonal_faces[0], op.a[behind], self.own)
-                diagonal += np.bincount(self._diagonal_faces[1], op.b[ahead], self.own)
-                for port in (*op.inlets.values(), *op.outlets.values()):
-                    np.add.at(diagonal, port.cells, port.out)
-                diagonals[id(op)] = diagonal
-        self.values[: self.count] = np.concatenate(
-            [-op.b[behind] for op in operators] + [-op.a[ahead] for op in operators]
-        )
-        self._holds_fluxes = False
-        return np.stack([diagonals[id(op)] for op in operators])
+    def set_fluxes(self, operators: Sequence[FluxOperator]) -> Floats:
+        """Enter the face fluxes of one operator per unknown; returns what they add to the diagonal, (unknowns, own) [m2/s]."""
+        versions = [operator.version for operator in operators]
+        if versions != self._versions:
+            diagonals = {operator.version: self.pattern.diagonal(operator) for operator in operators}
+            self._outflow = np.stack([diagonals[version] for version in versions])
+            self._values[: self._couplings] = np.concatenate([self.pattern.coupling(o) for o in operators])
+            self._versions, self._holds_fluxes = versions, False
+        return self._outflow
 
     def assemble(self, blocks: Floats) -> None:
-        """Set the diagonal blocks (own, b, b) and assemble; of one unknown per cell only the diagonal is entered anew."""
+        """Set the diagonal blocks (own, unknowns, unknowns) and assemble; of one unknown per cell only the diagonal is entered anew."""
         if self._diagonal is not None and self._holds_fluxes:
             self._diagonal.array[:] = blocks.ravel()
             self.matrix.setDiagonal(self._diagonal)
             return
-        self.values[self.count :] = blocks.ravel()
-        self.matrix.setValuesCOO(self.values)
+        self._values[self._couplings :] = blocks.ravel()
+        self.matrix.setValuesCOO(self._values)
         self._holds_fluxes = True
 
 
 class StepMatrix:
     """gas_volume/dt + fluxes for one species, with the solvers that go with it; `fill` as in KrylovSolver."""
 
-    def __init__(self, strip: Strip, gas_volume: Floats, name: str, fill: int = 0):
+    def __init__(self, strip: Strip, name: str, fill: int = 0):
+        self.strip, self.name, self.fill = strip, name, fill
         self.cells = CellMatrix(strip, 1)
-        self.gas_volume, self.name, self.fill = gas_volume, name, fill
-        self.key: tuple[int, float] | None = None
-        self.krylov: KrylovSolver | None = None
-        self.x, self.y = self.cells.matrix.createVecs()
+        self._holds: tuple[int, float] | None = None
+        self._krylov: KrylovSolver | None = None
+        self._x, self._y = self.cells.matrix.createVecs()
 
     def update(self, operator: FluxOperator, dt: float) -> None:
-        diagonal = self.cells.set_fluxes([operator])[0] + self.gas_volume / dt
-        self.cells.assemble(diagonal)
+        """Make it the matrix of `operator` over a step of `dt` [s], infinite for the steady one."""
+        if self._holds != (operator.version, dt):
+            storage = self.strip.gas_volume[: self.strip.owned] / dt
+            self.cells.assemble(self.cells.set_fluxes([operator])[0] + storage)
+            self._holds = (operator.version, dt)
 
     def multiply(self, values: Floats) -> Floats:
-        self.x.array[:] = values
-        self.cells.matrix.mult(self.x, self.y)
-        return self.y.array.copy()
+        """The product with own `values`, (own,); collective."""
+        self._x.array[:] = values
+        self.cells.matrix.mult(self._x, self._y)
+        return np.array(self._y.array)
 
     def solve(self, rhs: Floats, guess: Floats, residual: float) -> Floats:
-        """BiCGStab from `guess` until the residual norm is below `residual` [mol/m/s]."""
-        if self.krylov is None:
-            self.krylov = KrylovSolver(self.cells.matrix, self.name, 0.0, fill=self.fill)
-            self.krylov.ksp.setTolerances(
+        """BiCGStab from `guess` until the residual norm is below `residual` [mol/m/s]; collective. Raises ConvergenceError."""
+        if self._krylov is None:
+            self._krylov = KrylovSolver(self.cells.matrix, self.name, 0.0, fill=self.fill)
+            self._krylov.ksp.setTolerances(
                 rtol=1e-13, atol=residual / np.sqrt(max(self.cells.matrix.size[0], 1))
             )
-        self.y.array[:] = rhs
-        self.x.array[:] = guess
-        self.krylov.solve(self.y, self.x, guess=True)
-        return self.x.array.copy()
+        self._y.array[:] = rhs
+        self._x.array[:] = guess
+        self._krylov.solve(self._y, self._x, guess=True)
+        return np.array(self._x.array)

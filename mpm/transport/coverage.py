@@ -7,7 +7,8 @@ position error below one column. Columns that slide out are remembered at either
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,64 +17,108 @@ from mpm.mesh.strip import Strip
 from mpm.parallel import Scatter
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from mpm.case.case import Case
+    from mpm.case.materials import Material
+    from mpm.physics.kinetics import SurfaceKinetics
 
 Floats = NDArray[np.float64]
+TIE = 1e-6  # of a column: half a column, reached by rounding from either side, is always not yet enough
+MEMORY = 64  # columns remembered beyond each end; the bed swings back by a few at most
 
 
-class Bed:
-    """Coverages theta (sites, n) in this rank's `cells` with reactive solid.
+def initial(site: str) -> Callable[[Material], float]:
+    """The coverage of `site` that a material comes in with."""
+    return lambda solid: solid.initial_coverage.get(site, 0.0)
 
-    `surface` S [1/m], `sites` n_s [mol/m2], `capacity` S n_s V [mol per metre of depth] per cell. `passed` counts, per site species,
-    the sites that have left at the right minus those that came in at the left (or the reverse for a negative number) [mol/m];
-    zero where the solids are periodic.
+
+@dataclass(frozen=True, eq=False)
+class Memento:
+    """The coverage and the place of the bed at one instant, to go back to."""
+
+    theta: Floats
+    distance: float
+    shifted: int
+    left: list[Floats]
+    right: list[Floats]
+    passed: Floats
+
+
+class Coverage:
+    """Coverages `theta` (sites, n) of the solids in this rank's `cells`, those with reactive surface; nobody else writes them.
+
+    `rows` are the grid's rows with reactive solids, `place` (n,) the index of each cell's row among them, `moving_rows` those that slide.
+    `surface` S [1/m] and `sites` n_s [mol/m2] per cell, `fresh` (sites, rows) what solids come in with. `distance` [m] is how far the bed
+    has slid, `shifted` by how many columns; `passed` counts, per site species, the sites that have left at the right minus those that came
+    in at the left (or the reverse for a negative number) [mol/m]; zero where the solids are periodic.
     """
 
     def __init__(self, case: Case, strip: Strip):
-        grid = strip.grid
-        layers = case.geometry.layers
-        names = case.mechanism.site_names
-        reactive = [
-            row
-            for row, i in enumerate(grid.row_layer)
-            if layers[i].material and layers[i].material.surface_to_volume > 0.0
-        ]
-        self.rows = np.asarray(reactive, dtype=np.int64)
-        self.columns = grid.columns
-        solids = [layers[grid.row_layer[row]].material for row in reactive]
-        moving = np.array([layers[grid.row_layer[row]].moving for row in reactive], dtype=bool)
-        self.moving_rows = np.flatnonzero(moving)
-        self.fresh = np.array([[s.initial_coverage.get(k, 0.0) for s in solids] for k in names]).reshape(
-            len(names), -1
-        )
+        grid, names = strip.grid, case.mechanism.site_names
+        surface = grid.per_row(lambda solid: solid.surface_to_volume, gas=0.0)
+        density = grid.per_row(lambda solid: solid.site_density, gas=0.0)
+        self.strip, self.columns = strip, grid.columns
+        self.rows = np.flatnonzero(surface > 0.0)
+        self.moving_rows = np.flatnonzero(grid.moving[self.rows])
+        fresh = [grid.per_row(initial(name), gas=0.0) for name in names]
+        self.fresh = np.array(fresh).reshape(len(names), grid.rows)[:, self.rows]
         place_of_row = np.full(grid.rows, -1)
         place_of_row[self.rows] = np.arange(len(self.rows))
         self.cells = np.flatnonzero(place_of_row[strip.row[: strip.owned]] >= 0)
-        self.place = place_of_row[strip.row[self.cells]]  # index into `rows`
+        self.place = place_of_row[strip.row[self.cells]]
         self.scatter = Scatter(
             strip.comm, self.place * grid.columns + strip.column[self.cells], len(self.rows) * grid.columns
         )
-        surface = np.array([s.surface_to_volume for s in solids])
-        density = np.array([s.site_density for s in solids])
-        self.surface, self.sites = surface[self.place], density[self.place]
-        self.row_capacity = surface * density * grid.dy[self.rows] * grid.dx
-        self.capacity = self.row_capacity[self.place]
-        self.theta = np.ascontiguousarray(self.fresh[:, self.place])
-        self.dx, self.periodic = grid.dx, case.geometry.bed_inflow == "periodic"
-        self.distance = 0.0  # slid since the start [m]
+        self._row_surface, self._row_sites = surface[self.rows], density[self.rows]
+        self.surface, self.sites = self._row_surface[self.place], self._row_sites[self.place]
+        self.periodic = case.geometry.bed_inflow == "periodic"
+        self._theta = np.ascontiguousarray(self.fresh[:, self.place])
+        self.distance = 0.0
         self.shifted = 0  # columns already moved
-        self.left: list[Floats] = []  # columns (sites, moving rows) beyond the left end, nearest last
-        self.right: list[Floats] = []
+        self._left: list[Floats] = []  # columns (sites, moving rows) beyond the left end, nearest last
+        self._right: list[Floats] = []
         self.passed = np.zeros(len(names))
+
+    @property
+    def theta(self) -> Floats:
+        """The coverages; an array that is replaced, never changed in place."""
+        return self._theta
+
+    @property
+    def area(self) -> Floats:
+        """Reactive area in each cell [m2 per metre of depth]."""
+        return np.asarray(self.surface * self.strip.volume[self.cells])
+
+    @property
+    def capacity(self) -> Floats:
+        """Sites of all kinds in each cell, S n_s V [mol per metre of depth]."""
+        return np.asarray(self.sites * self.area)
+
+    def content(self) -> Floats:
+        """Sites of each kind on this rank's solids [mol per metre of depth]."""
+        return self._theta @ self.capacity
 
     def whole(self) -> Floats:
         """Coverage on every rank as (sites, rows, columns); collective."""
-        return self.scatter.to_all(self.theta).reshape(len(self.theta), len(self.rows), self.columns)
+        return self.scatter.to_all(self._theta).reshape(len(self._theta), len(self.rows), self.columns)
 
-    def advance(self, distance: float) -> int:
+    # --- what changes it ---
+
+    def react(self, surface: SurfaceKinetics, concentration: Floats, dt: float) -> None:
+        """Follow the gas at its new `concentration` (coupled, n) [mol/m3] over `dt` [s]."""
+        self._theta = surface.coverage(concentration, self._theta, dt)
+
+    def become(self, theta: Floats, passed: Floats | None = None) -> None:
+        """Take over coverages (sites, n) that were found otherwise, as those of a steady state, and what has `passed` meanwhile."""
+        self._theta = np.array(theta)
+        if passed is not None:
+            self.passed = passed
+
+    def slide(self, distance: float) -> int:
         """Slide the bed by `distance` [m] relative to the mesh; returns the number of whole columns it moved. Collective."""
         self.distance += distance
-        columns = np.floor(abs(self.distance) / self.dx + 0.5 - TIE)
+        columns = np.floor(abs(self.distance) / self.strip.grid.dx + 0.5 - TIE)
         target = int(np.copysign(columns, self.distance))
         count = target - self.shifted
         if count and len(self.moving_rows):
@@ -85,34 +130,51 @@ class Bed:
                 for _ in range(abs(count)):
                     moving = self._shift(moving, 1 if count > 0 else -1)
             whole[:, self.moving_rows] = moving
-            self.theta = self.scatter.to_local(whole.reshape(len(whole), -1))
+            self._theta = self.scatter.to_local(whole.reshape(len(whole), -1))
         self.shifted = target
         return count
 
     def _shift(self, moving: Floats, direction: int) -> Floats:
         """One column to the right (+1) or left (-1): what leaves is remembered, what enters is remembered or fresh."""
-        leaving, entering = (self.right, self.left) if direction > 0 else (self.left, self.right)
-        capacity = self.row_capacity[self.moving_rows]
+        leaving, entering = (self._right, self._left) if direction > 0 else (self._left, self._right)
+        grid = self.strip.grid
+        capacity = (self._row_surface * self._row_sites * grid.dy[self.rows] * grid.dx)[self.moving_rows]
         gone = moving[:, :, -1 if direction > 0 else 0].copy()
         leaving.append(gone)
         new = entering.pop() if entering else self.fresh[:, self.moving_rows]
-        self.passed += (gone - new) @ capacity
+        self.passed = self.passed + (gone - new) @ capacity
         shifted = np.roll(moving, direction, axis=2)
         shifted[:, :, 0 if direction > 0 else -1] = new
         del leaving[:-MEMORY]
         return shifted
 
-    def memento(self) -> tuple:
-        """The present state, to go back to with `recall`. Coverages are replaced, never changed in place, so this is cheap."""
-        return self.theta, self.distance, self.shifted, list(self.left), list(self.right), self.passed.copy()
+    # --- going back ---
 
-    def recall(self, memento: tuple) -> None:
-        self.theta, self.distance, self.shifted, self.left, self.right, self.passed = memento
+    def memento(self) -> Memento:
+        """The present state; cheap, because arrays are replaced and never changed in place."""
+        return Memento(
+            self._theta, self.distance, self.shifted, list(self._left), list(self._right), self.passed
+        )
 
-    def content(self) -> Floats:
-        """Sites of each kind on this rank's solids [mol per metre of depth]."""
-        return self.theta @ self.capacity
+    def recall(self, memento: Memento) -> None:
+        """Go back to a state of this run."""
+        self._theta, self.distance, self.shifted = memento.theta, memento.distance, memento.shifted
+        self._left, self._right, self.passed = list(memento.left), list(memento.right), memento.passed
 
+    def stored(self) -> dict[str, Any]:
+        """Arrays of a restart state, in grid order on rank 0 (None elsewhere for `theta`); collective."""
+        return {
+            "theta": self.scatter.to_root(self._theta),
+            "passed": self.passed,
+            "left": np.asarray(self._left),
+            "right": np.asarray(self._right),
+            "distance": self.distance,
+            "shifted": self.shifted,
+        }
 
-TIE = 1e-6  # of a column: half a column, reached by rounding from either side, is always not yet enough
-MEMORY = 64  # columns remembered beyond each end; the bed swings back by a few at most
+    def restore(self, stored: dict[str, Any]) -> None:
+        """The inverse of `stored`, on every rank."""
+        self._theta = self.scatter.to_local(stored["theta"])
+        self.passed = stored["passed"]
+        self._left, self._right = list(stored["left"]), list(stored["right"])
+        self.distance, self.shifted = float(stored["distance"]), int(stored["shifted"])

@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.flow.cycle import mean_field, periodic_flow
-from mpm.flow.problem import FlowProblem, face_flow
-from mpm.flow.steady import FlowField
-from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
+from mpm.flow.cycle import periodic_flow
+from mpm.flow.fields import FlowField, face_flow, mean_field
+from mpm.flow.problem import FlowProblem
+from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion
 from mpm.numerics.linear import DirectSolver
 from mpm.parallel import total
 from mpm.transport.cell_matrix import CellMatrix
-from mpm.transport.fluxes import FluxAssembler, effective_diffusivity
+from mpm.transport.fluxes import FluxAssembler, cell_diffusivity
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -40,7 +40,7 @@ LEAST = 0.1  # of D_eff: what a locally negative K leaves of it
 def vibrational_dispersion(
     case: Case,
     strip: Strip,
-    bed: BedMotion,
+    bed_motion: BedMotion,
     diffusivities: Sequence[float],
     watch: Callable[[int, float], None] | None = None,
 ) -> Floats:
@@ -51,14 +51,13 @@ def vibrational_dispersion(
     if case.motion.gamma == 0.0:
         return np.zeros((len(diffusivities), 2, strip.local))
     phases = case.time.steps_per_cycle
-    problem = FlowProblem(case, strip, bed.vibration.period / phases)
-    fields = periodic_flow(problem, bed, phases, watch)
+    problem = FlowProblem(case, strip, bed_motion.vibration.period / phases)
+    fields = periodic_flow(problem, bed_motion, phases, watch)
     result = np.empty((len(diffusivities), 2, strip.local))
     for k, diffusivity in enumerate(diffusivities):
-        tensor = dispersion_tensor(case, strip, fields, bed.vibration.period, diffusivity)
+        tensor = dispersion_tensor(case, strip, fields, bed_motion.vibration.period, diffusivity)
         whole = strip.scatter.to_all(np.stack([tensor[0, 0], tensor[1, 1]]))[:, strip.cell]
-        molecular = np.stack(effective_diffusivity(case, strip, diffusivity))
-        result[k] = np.maximum(whole, (LEAST - 1.0) * molecular)
+        result[k] = np.maximum(whole, (LEAST - 1.0) * cell_diffusivity(strip, diffusivity))
     return result
 
 
@@ -68,14 +67,14 @@ def dispersion_tensor(
     """K (2, 2, own cells) [m2/s] from one stored cycle of the flow lasting `period` [s]; collective."""
     own, volume = strip.owned, strip.volume[: strip.owned]
     phases = len(fields)
-    velocity = np.stack([cell_velocity(field, own) for field in fields])  # (phases, 2, own)
+    velocity = np.stack([field.in_cells(own) for field in fields])  # (phases, 2, own)
     harmonics = np.fft.rfft(velocity, axis=0) / phases
     energy = total(strip.comm, (np.abs(harmonics) ** 2 * volume).sum(axis=(1, 2)))
     flow = face_flow(strip, mean_field(list(fields)).velocities)
-    operator = FluxAssembler(case, strip, diffusivity).operator(flow)
+    operator = FluxAssembler(case, strip, cell_diffusivity(strip, diffusivity)).operator(flow)
     cells = CellMatrix(strip, 2)  # real and imaginary part
     diagonal = cells.set_fluxes([operator, operator])
-    storage = porosity(case, strip) * volume
+    storage = strip.gas_volume[:own]
     x, y = cells.matrix.createVecs()
     solver = DirectSolver(cells.matrix, "dispersion by vibration")
     tensor = np.zeros((2, 2, own))
@@ -95,15 +94,3 @@ def dispersion_tensor(
             real, imaginary = x.array.reshape(own, 2).T
             tensor[:, j] -= twice * (harmonics[n].conj() * (real + 1j * imaginary)).real
     return tensor
-
-
-def cell_velocity(field: FlowField, own: int) -> Floats:
-    """Velocity at the centres of own cells, (2, own) [m/s]."""
-    v = field.velocities[:, :own]
-    return 0.5 * np.stack([v[LEFT] + v[RIGHT], v[BOTTOM] + v[TOP]])
-
-
-def porosity(case: Case, strip: Strip) -> Floats:
-    """eps in own cells; 1 in gas."""
-    solids = [case.geometry.layers[i].material for i in strip.grid.row_layer]
-    return np.asarray([s.porosity if s else 1.0 for s in solids])[strip.row[: strip.owned]]

@@ -16,16 +16,16 @@ from numpy.typing import NDArray
 
 from mpm.numerics.linear import DirectSolver
 from mpm.parallel import any_rank, total
-from mpm.transport.cell_matrix import StepMatrix
+from mpm.transport.cell_matrix import CellMatrix
 
 if TYPE_CHECKING:
+    from mpm.mesh.strip import Strip
     from mpm.transport.fluxes import FluxOperator, PortFlux
-    from mpm.transport.species import Transport
 
 Floats = NDArray[np.float64]
 
 
-def steady_fields(transport: Transport, operators: list[FluxOperator], supply: Floats) -> Floats:
+def steady_fields(strip: Strip, operators: list[FluxOperator], supply: Floats) -> Floats:
     """Concentrations (n, own cells) [mol/m3] under `supply` (n, own cells) [mol/m/s] from inlets and reactions; collective.
 
     `operators` are those of the n species. Raises ConvergenceError.
@@ -33,23 +33,22 @@ def steady_fields(transport: Transport, operators: list[FluxOperator], supply: F
     fields = np.zeros_like(supply)
     for operator in dict.fromkeys(operators):
         alike = [i for i, o in enumerate(operators) if o is operator]
-        if any_rank(
-            transport.strip.comm, bool(np.any(supply[alike]))
-        ):  # without gas flow only 0 = 0 can be solved
-            fields[alike] = _fields(transport, operator, supply[alike])
+        if any_rank(strip.comm, bool(np.any(supply[alike]))):  # without gas flow only 0 = 0 can be solved
+            fields[alike] = _fields(strip, operator, supply[alike])
     return fields
 
 
-def _fields(transport: Transport, operator: FluxOperator, supply: Floats) -> Floats:
+def _fields(strip: Strip, operator: FluxOperator, supply: Floats) -> Floats:
     """Fields of species with the same operator."""
-    matrix = StepMatrix(transport.strip, transport.gas_volume, "tracers")
-    matrix.update(operator, np.inf)
-    solver = DirectSolver(matrix.cells.matrix, "steady species that do not react")
+    cells = CellMatrix(strip, 1)
+    cells.assemble(cells.set_fluxes([operator]))
+    solution, right = cells.matrix.createVecs()
+    solver = DirectSolver(cells.matrix, "steady species that do not react")
 
     def solve(rhs: Floats) -> Floats:
-        matrix.y.array[:] = rhs
-        solver.solve(matrix.y, matrix.x)
-        return matrix.x.array.copy()
+        right.array[:] = rhs
+        solver.solve(right, solution)
+        return np.array(solution.array)
 
     try:
         own = np.stack([solve(rhs) for rhs in supply])
@@ -60,7 +59,7 @@ def _fields(transport: Transport, operator: FluxOperator, supply: Floats) -> Flo
     finally:
         solver.destroy()
     both, split = np.vstack([own, returned]), len(own)
-    sums = total(transport.strip.comm, [[*(both[:, p.cells] @ p.area), p.area.sum()] for p in ports])
+    sums = total(strip.comm, [[*(both[:, p.cells] @ p.area), p.area.sum()] for p in ports])
     means = sums[:, :-1] / sums[:, -1:]
     drawn = np.linalg.solve(np.eye(len(ports)) - means[:, split:], means[:, :split])
     return own + drawn.T @ returned

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from mpm.case.case import Case
 from mpm.flow.cycle import cycle_motions, periodic_flow
-from mpm.flow.problem import FaceFlow, FlowProblem
-from mpm.flow.steady import FlowField, steady_flow
-from mpm.mesh.grid import Grid
+from mpm.flow.fields import FlowField
+from mpm.flow.problem import FlowProblem
+from mpm.flow.sequence import MarchedFlow
+from mpm.flow.steady import steady_flow
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
 from mpm.motion.schedule import Schedule
-from mpm.reactor.sequence import March
 from reproduction.store import Arrays, Lab
 
 from mpi4py import MPI  # isort: skip  (after fem)
@@ -27,13 +27,6 @@ BOTTOM, LEFT, RIGHT, TOP = range(4)
 SHOWN = 16  # phases whose fields are kept for pictures
 
 
-class _NoTransport:
-    """Takes the place of the species when the flow is marched alone."""
-
-    def replace_flow(self, number: int, flow: FaceFlow) -> None:
-        """Nothing follows the flow."""
-
-
 def at_rest(lab: Lab, case: Case) -> Arrays:
     """Gas flow before the vibration, the bed at rest: steady, and 50 ms after the inlets open."""
 
@@ -41,9 +34,9 @@ def at_rest(lab: Lab, case: Case) -> Arrays:
         strip = Strip(case, MPI.COMM_SELF)
         schedule, bed = Schedule.from_case(case), BedMotion(case.motion)
         steady = steady_flow(FlowProblem(case, strip, schedule.dt))
-        march = March(case, strip, bed, schedule)
+        march = MarchedFlow(case, strip, bed, schedule)
         for n in range(schedule.resting_steps):
-            march.number(schedule.step(n), _NoTransport())  # type: ignore[arg-type]
+            march.at(schedule.step(n))
         grids = (_grid(strip, steady), _grid(strip, march.current))
         return {"steady": grids[0], "after_50ms": grids[1]}
 
@@ -67,10 +60,10 @@ def cycle(lab: Lab, case: Case, first: int | None = None) -> Arrays:
             fields = periodic_flow(FlowProblem(case, strip, schedule.dt), bed, schedule.phases)
             start = bed.vibration.period
         else:
-            march = March(case, strip, bed, schedule)
+            march = MarchedFlow(case, strip, bed, schedule)
             count = schedule.resting_steps + (first + 1) * schedule.phases
             for n in range(count):
-                march.number(schedule.step(n), _NoTransport())  # type: ignore[arg-type]
+                march.at(schedule.step(n))
             fields, start = march.recent, first * bed.vibration.period
             motions = [
                 step_motion(bed, start + k * schedule.dt, start + (k + 1) * schedule.dt)
@@ -101,7 +94,7 @@ def _reduce(
     places = np.array([bed.vibration.displacement(t) for t in ends])
     frame = np.diff(places, axis=0) / dt
     whole = np.array([_grid(strip, f) for f in fields])
-    porosity = porosities(case, grid)
+    porosity = grid.per_row(lambda solid: solid.porosity, gas=1.0)
     arrays: Arrays = {
         "phase": np.degrees(bed.vibration.omega * (ends[:-1] + 0.5 * dt)) % 360.0,
         "frame": frame,
@@ -131,8 +124,3 @@ def _reduce(
     shown = np.linspace(0, n, SHOWN, endpoint=False).astype(int)
     arrays["shown"], arrays["fields"] = shown, whole[shown].astype(np.float32)
     return arrays
-
-
-def porosities(case: Case, grid: Grid) -> Floats:
-    """Porosity of each row, 1 in gas."""
-    return np.array([m.porosity if (m := case.geometry.layers[i].material) else 1.0 for i in grid.row_layer])

@@ -21,7 +21,7 @@ from mpm.motion.kinematics import BedMotion
 from mpm.pictures.outline import draw_ports
 from mpm.pictures.standard import STYLE
 from reproduction.flow_rows import GAMMAS, resolved
-from reproduction.flows import BOTTOM, LEFT, RIGHT, TOP, at_rest, cycle, porosities
+from reproduction.flows import BOTTOM, LEFT, RIGHT, TOP, at_rest, cycle
 from reproduction.pictures import save
 from reproduction.store import Arrays, Lab
 
@@ -35,7 +35,7 @@ LINE_Y = -0.005
 
 def pore_velocity(grid: Grid, case: Case, field: Floats) -> tuple[Floats, Floats]:
     """Velocity of the gas in the pores at cell centres relative to the reactor, (rows, columns) each [m/s]."""
-    eps = porosities(case, grid)[:, None]
+    eps = grid.per_row(lambda solid: solid.porosity, gas=1.0)[:, None]
     return 0.5 * (field[LEFT] + field[RIGHT]) / eps, 0.5 * (field[BOTTOM] + field[TOP]) / eps
 
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.reactor.steady.system import Iterate, SteadySystem
+
 if TYPE_CHECKING:
     from mpm.case.case import Case
-    from mpm.reactor.steady_system import SteadySystem
 
 Floats = NDArray[np.float64]
 FEWEST = 10_000  # cells from which a coarser mesh saves more steps than it costs
@@ -27,21 +28,20 @@ def coarser(case: Case) -> Case | None:
     return case.with_(changes)
 
 
-def prolong(coarse: SteadySystem, fine: SteadySystem) -> None:
-    """Start `fine` from the state of `coarse`: every cell takes that of the coarse cell around its centre; collective.
+def prolonged(coarse: SteadySystem, state: Iterate, fine: SteadySystem) -> Iterate:
+    """The `state` of `coarse` on the mesh of `fine`: every cell takes that of the coarse cell around its centre; collective.
 
     Exposure, concentration times length along the bed, is thereby kept, and with it the coverage that leaves.
     """
-    grid, wide = fine.strip.grid, coarse.strip.grid
-    row, column = _around(wide.y, grid.y), _around(wide.x, grid.x)
-    shape = (wide.rows, wide.columns)
-    whole = coarse.strip.scatter.to_all(coarse.concentration).reshape(-1, *shape)
-    own = slice(0, fine.own)
-    fine.concentration = whole[:, row[fine.strip.row[own]], column[fine.strip.column[own]]]
-    theta = coarse.bed.scatter.to_all(coarse.theta).reshape(coarse.kinds, len(coarse.bed.rows), wide.columns)
-    rows = np.searchsorted(coarse.bed.rows, row[fine.bed.rows])
-    cells = fine.bed.cells
-    fine.theta = theta[:, rows[fine.bed.place], column[fine.strip.column[cells]]]
+    strip, wide = fine.strip, coarse.strip.grid
+    row, column = _around(wide.y, strip.grid.y), _around(wide.x, strip.grid.x)
+    whole = coarse.strip.scatter.to_all(state.concentration).reshape(-1, wide.rows, wide.columns)
+    own = slice(0, strip.owned)
+    concentration = whole[:, row[strip.row[own]], column[strip.column[own]]]
+    theta = coarse.conveyor.whole(state.theta)
+    rows = np.searchsorted(coarse.coverage.rows, row[fine.coverage.rows])
+    cells = fine.coverage.cells
+    return Iterate(concentration, theta[:, rows[fine.coverage.place], column[strip.column[cells]]])
 
 
 def _around(edges: Floats, finer: Floats) -> NDArray[np.int64]:

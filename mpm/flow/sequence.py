@@ -1,0 +1,141 @@
+"""Which velocity field belongs to which step of a run: replayed from a cycle that is known, or marched as a transient."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.flow.courant import check_bounded
+from mpm.flow.cycle import mean_motion, periodic_flow
+from mpm.flow.fields import FlowField, mean_field
+from mpm.flow.problem import FlowProblem
+from mpm.flow.steady import steady_flow
+from mpm.mesh.strip import Strip
+from mpm.motion.kinematics import BedMotion, step_motion
+from mpm.motion.schedule import RESTING, Schedule, Step
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+
+Floats = NDArray[np.float64]
+Watch = Callable[[int, float], None]  # of a cycle's number and what has changed since the one before
+
+
+class FlowSequence(Protocol):
+    """The flow of a run, one field per step."""
+
+    def at(self, step: Step) -> FlowField:
+        """The field of `step`; steps are asked for in their order. Raises ConvergenceError, the field before kept."""
+
+    def shown(self, step: Step) -> FlowField:
+        """The field of `step`, which has been taken, for those who look at it."""
+
+    def mean(self) -> FlowField:
+        """Mean over the cycle, over the last one where they differ."""
+
+    def stored(self, own: int) -> Floats:
+        """Everything needed to go on, (fields, 5, own cells): four velocities and the pressure of each field."""
+
+
+@dataclass(frozen=True, eq=False)
+class CyclicFlow:
+    """A cycle that repeats: the field `at_rest` where the run begins without vibration, then one per phase, a mean being one phase."""
+
+    at_rest: FlowField | None
+    phases: Sequence[FlowField]
+
+    @classmethod
+    def solve(
+        cls, case: Case, strip: Strip, bed_motion: BedMotion, schedule: Schedule, watch: Watch | None = None
+    ) -> CyclicFlow:
+        """The resolved cycle, or the steady flow under its mean forcing; without a rest where the fidelity is steady.
+
+        Raises ConvergenceError.
+        """
+        problem = FlowProblem(case, strip, schedule.dt)
+        rests = schedule.resting_steps > 0 and case.fidelity != "steady"
+        at_rest = steady_flow(problem) if rests else None
+        if case.fidelity == "resolved":
+            phases = periodic_flow(problem, bed_motion, schedule.phases, watch)
+        else:
+            phases = [steady_flow(problem, mean_motion(bed_motion))]
+        problem.release()
+        return cls(at_rest, phases)
+
+    def at(self, step: Step) -> FlowField:
+        """The field of the step's phase."""
+        if step.phase == RESTING and self.at_rest is not None:
+            return self.at_rest
+        return self.phases[max(step.phase, 0)]
+
+    shown = at
+
+    def mean(self) -> FlowField:
+        """Mean over the cycle."""
+        return mean_field(self.phases)
+
+    def stored(self, own: int) -> Floats:
+        """The field at rest, where there is one, then the phases."""
+        first = [] if self.at_rest is None else [self.at_rest]
+        return np.stack([field.stored(own) for field in (*first, *self.phases)])
+
+    @classmethod
+    def restored(cls, strip: Strip, stored: Floats, rests: bool) -> CyclicFlow:
+        """The inverse of `stored`, from the arrays in grid order."""
+        fields = [FlowField.restored(strip, field) for field in stored]
+        return cls(fields[0], fields[1:]) if rests else cls(None, fields)
+
+
+class MarchedFlow:
+    """The true transient after an impulsive start: gas at rest when the inlets open at t = 0, the vibration starting later.
+
+    One flow step per time step, refined: a resumed run makes its own factor. `recent` holds the fields of the last full cycle, `done`
+    counts the steps marched.
+    """
+
+    def __init__(self, case: Case, strip: Strip, bed_motion: BedMotion, schedule: Schedule):
+        self.case, self.strip, self.bed_motion, self.schedule = case, strip, bed_motion, schedule
+        self._problem = FlowProblem(case, strip, schedule.dt, refined=True)
+        resting = schedule.step(0).whole
+        same = abs(resting - schedule.dt) < SAME_STEP * schedule.dt
+        self._resting = self._problem if same else FlowProblem(case, strip, resting, refined=True)
+        self.current = self._problem.field()
+        self.recent: list[FlowField] = []
+        self.done = 0
+
+    def at(self, step: Step) -> FlowField:
+        """March to the end of `step` (once). Raises ConvergenceError, the old field kept."""
+        if self.done == step.index:
+            problem = self._resting if step.phase == RESTING else self._problem
+            problem.start_from(self.current)
+            problem.step(step_motion(self.bed_motion, step.since, step.since + step.whole))
+            reached = problem.field()
+            check_bounded(self.case, self.strip, self.current.velocities, reached.velocities, problem.dt)
+            self.current = reached
+            self.done += 1
+            self.recent = [*self.recent, reached][-self.schedule.phases :]
+        return self.current
+
+    def shown(self, step: Step) -> FlowField:
+        """The field reached, whatever the step."""
+        return self.current
+
+    def mean(self) -> FlowField:
+        """Mean over the last cycle marched."""
+        return mean_field(self.recent or [self.current])
+
+    def stored(self, own: int) -> Floats:
+        """The present field, then those of the last cycle."""
+        return np.stack([field.stored(own) for field in (self.current, *self.recent)])
+
+    def restore(self, stored: Floats, done: int) -> None:
+        """Go on after `done` steps from the arrays of `stored` in grid order."""
+        self.current, *self.recent = [FlowField.restored(self.strip, field) for field in stored]
+        self.done = done
+
+
+SAME_STEP = 1e-12  # of a step: how far two lengths may lie apart by rounding

@@ -1,0 +1,99 @@
+"""The flow of a run as the reactor uses it, and as it may be handed from one run to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.errors import InputError
+from mpm.flow.sequence import CyclicFlow, FlowSequence, MarchedFlow, Watch
+from mpm.transport.dispersion import vibrational_dispersion
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+    from mpm.mesh.strip import Strip
+    from mpm.motion.kinematics import BedMotion
+    from mpm.motion.schedule import Schedule
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """The velocity fields of a run with the `dispersion` (diffusivities, 2, local cells) [m2/s] that vibration adds for gases of these
+    `diffusivities` [m2/s], None without; `conditions` are those that the fields depend on."""
+
+    sequence: FlowSequence
+    conditions: dict[str, Any]
+    dispersion: Floats | None = None
+    diffusivities: tuple[float, ...] = ()
+
+
+def find_flow(
+    case: Case, strip: Strip, bed_motion: BedMotion, schedule: Schedule, watch: Watch | None = None
+) -> Flow:
+    """The flow of a case, without dispersion; collective. `watch` is called as it is found. Raises ConvergenceError."""
+    sequence: FlowSequence
+    if _is_marched(case):
+        sequence = MarchedFlow(case, strip, bed_motion, schedule)
+    else:
+        sequence = CyclicFlow.solve(case, strip, bed_motion, schedule, watch)
+    return Flow(sequence, conditions(case, schedule))
+
+
+def dispersed(
+    flow: Flow,
+    case: Case,
+    strip: Strip,
+    bed_motion: BedMotion,
+    diffusivities: list[float],
+    watch: Watch | None = None,
+) -> Flow:
+    """`flow` with the dispersion of gases with these `diffusivities` [m2/s] where the case asks for it; collective.
+
+    Raises ConvergenceError.
+    """
+    wanted = tuple(diffusivities) if case.transport.vibrational_dispersion and not _is_marched(case) else ()
+    if wanted == flow.diffusivities:
+        return flow
+    found = vibrational_dispersion(case, strip, bed_motion, wanted, watch) if wanted else None
+    return replace(flow, dispersion=found, diffusivities=wanted)
+
+
+def taken_over(flow: Flow, case: Case, schedule: Schedule) -> Flow:
+    """`flow`, found for another case; species and doses may differ. Raises InputError where it would be another one for `case`."""
+    if isinstance(flow.sequence, MarchedFlow):
+        raise InputError(
+            "flow: found a transient, which belongs to one run; accepted: the flow of a developed run"
+        )
+    for name, wanted in conditions(case, schedule).items():
+        if flow.conditions[name] != wanted:
+            raise InputError(
+                f"flow: found that of another {name}; accepted: that of a case which differs in species and doses only"
+            )
+    return flow
+
+
+def conditions(case: Case, schedule: Schedule) -> dict[str, Any]:
+    """All of a case that its flow depends on, by names for people."""
+    geometry = case.geometry
+    return {
+        "mesh": (geometry.length, geometry.columns, geometry.periodic),
+        "layer": [(layer.height, layer.cells, layer.grading, layer.moving) for layer in geometry.layers],
+        "material": [
+            (solid.porosity, solid.permeability, solid.viscosity_ratio) if (solid := layer.material) else None
+            for layer in geometry.layers
+        ],
+        "inlet": [(port.side, port.x0, port.x1, port.velocity) for port in geometry.inlets],
+        "outlet": [(port.side, port.x0, port.x1) for port in geometry.outlets],
+        "gas": (case.gas.density, case.gas.viscosity),
+        "motion": case.motion,
+        "fidelity": (schedule.phases, schedule.resting_steps > 0 and case.fidelity != "steady"),
+    }
+
+
+def _is_marched(case: Case) -> bool:
+    return case.fidelity == "resolved" and case.motion.startup == "impulsive"

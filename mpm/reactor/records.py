@@ -1,0 +1,90 @@
+"""What a system holds, gathered from all ranks for reports and files; every function is collective."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.parallel import largest, total
+from mpm.report.records import State, Totals
+
+if TYPE_CHECKING:
+    from mpm.reactor.system import System
+
+Floats = NDArray[np.float64]
+
+
+def totals(system: System) -> Totals:
+    """What has passed so far."""
+    transport, coverage, comm, grid = system.transport, system.coverage, system.comm, system.grid
+    ledger = transport.ledger
+    surface = coverage.scatter.to_all(ledger.surface)
+    count = len(system.case.geometry.zones) + 1
+    gas = np.array([np.bincount(_zones(system), events, count) for events in ledger.gas]).reshape(-1, count)
+    return Totals(
+        names=transport.names,
+        **vars(ledger.totals(comm)),
+        stored=system.stored_gas(),
+        stored_initially=system.stored_initially,
+        surface=surface.reshape(len(ledger.surface), len(coverage.rows), grid.columns),
+        gas=total(comm, gas),
+        reactive_rows=coverage.rows,
+        slid=coverage.distance,
+        sites=total(comm, coverage.content()),
+        sites_initially=system.sites_initially,
+        sites_passed=coverage.passed,
+    )
+
+
+def state(system: System) -> State:
+    """Coverage, dosed species and gas reaction rates now."""
+    transport, strip, grid, comm = system.transport, system.strip, system.grid, system.comm
+    rate = cvd_rate(system)
+    volume = strip.volume[: strip.owned]
+    per_zone = np.bincount(_zones(system), rate * volume, len(system.case.geometry.zones) + 1)
+    dosed = np.flatnonzero((transport.ports.feed > 0.0).any(axis=0))
+    fields = strip.scatter.to_all(transport.concentration[dosed]).reshape(-1, grid.rows, grid.columns)
+    return State(
+        theta=system.coverage.whole(),
+        reactive_rows=system.coverage.rows,
+        cvd=total(comm, per_zone),
+        cvd_max=float(largest(comm, [rate.max(initial=0.0)])[0]),
+        concentration={transport.names[i]: field for i, field in zip(dosed, fields, strict=True)},
+    )
+
+
+def _zones(system: System) -> NDArray[np.int64]:
+    """Number of the zone of each own cell."""
+    strip = system.strip
+    return np.asarray(strip.grid.zone_of_column[strip.column[: strip.owned]])
+
+
+def cvd_rate(system: System) -> Floats:
+    """Events of gas reactions per total volume in own cells [mol/m3/s]."""
+    transport, strip = system.transport, system.strip
+    rates, _ = transport.reactions.gas.rates(transport.concentration[: transport.coupled])
+    return np.asarray(rates.sum(axis=0) * strip.porosity[: strip.owned])
+
+
+def local_fields(system: System) -> dict[str, Floats]:
+    """Everything that can be shown, own cells: names as in the files."""
+    case, transport, coverage, own = system.case, system.transport, system.coverage, system.strip.owned
+    velocity = system.velocity
+    concentration = dict(zip(transport.names, transport.concentration, strict=True))
+    fields: dict[str, Floats] = {}
+    whole = case.gas.molar_density
+    carrier = np.ones(own)
+    for name in case.mechanism.species_names:
+        c = concentration.get(name, np.zeros(own))
+        fields[f"C_{name}"], fields[f"x_{name}"] = c, c / whole
+        carrier -= c / whole
+    fields[f"x_{case.gas.carrier}"] = carrier
+    for k, site in enumerate(case.mechanism.site_names):
+        fields[f"theta_{site}"] = np.zeros(own)
+        fields[f"theta_{site}"][coverage.cells] = coverage.theta[k]
+    fields["cvd_rate"] = cvd_rate(system)
+    fields["velocity_x"], fields["velocity_y"] = velocity.in_cells(own)
+    fields["pressure"] = velocity.pressure[:own]
+    return fields

@@ -1,0 +1,149 @@
+"""Solids that move through cells in the steady state: what enters each, and the coverages that follow from given concentrations.
+
+    n_s v_s dtheta/dx = n_s Q(C) theta     from fresh or periodic solids; v_s < 0: from the right end on
+
+The coverage is integrated exactly along the bed: solids that cross a cell of width h at its concentration leave with
+theta_out = theta_in exp(-nu_s k C h/(|v_s| n_s)) (one reaction; `SurfaceKinetics.conveyed` for more).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.parallel import total
+
+if TYPE_CHECKING:
+    from mpm.physics.kinetics import SurfaceKinetics
+    from mpm.reactor.system import System
+    from mpm.transport.coverage import Coverage
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Conveyor:
+    """The moving ones among the reactive cells of `coverage`, and the way of the solids through them.
+
+    `moving` and `resting` index the reactive cells, `is_moving` (reactive,) tells them apart; `place` gives a moving cell's index in
+    `moving`. `row` and `column` (moving,) are its place in the whole bed, `inside` where its solids come from another cell. Solids stay for
+    `residence` [s] in a cell and move in `direction` (1, -1) along x. `runs` tells on every rank whether any solids move.
+    """
+
+    def __init__(self, system: System):
+        coverage, strip = system.coverage, system.strip
+        self.coverage: Coverage = coverage
+        self.comm = system.comm
+        speed, self.direction = abs(system.bed_motion.mean), system.case.direction
+        self.runs = speed > 0.0 and len(coverage.moving_rows) > 0
+        moving_rows = coverage.moving_rows if self.runs else coverage.moving_rows[:0]
+        self.is_moving = np.isin(coverage.place, moving_rows)
+        self.moving, self.resting = np.flatnonzero(self.is_moving), np.flatnonzero(~self.is_moving)
+        self.place = np.cumsum(self.is_moving) - 1
+        self.residence = strip.grid.dx / speed if speed > 0.0 else np.inf
+        self.row, self.column = coverage.place[self.moving], strip.column[coverage.cells[self.moving]]
+        self.before = (self.column - self.direction) % coverage.columns  # column where its solids come from
+        self._first, self._last = (
+            (0, coverage.columns - 1) if self.direction > 0 else (coverage.columns - 1, 0)
+        )
+        self.inside = (self.column != self._first) | coverage.periodic
+
+    def whole(self, local: Floats) -> Floats:
+        """Values (n, reactive cells) of every rank as (n, reactive rows, columns); collective."""
+        coverage = self.coverage
+        return coverage.scatter.to_all(local).reshape(len(local), len(coverage.rows), coverage.columns)
+
+    def incoming(self, theta: Floats) -> Floats:
+        """Coverage of the solids entering every moving cell (sites, moving), from those that leave all cells; collective."""
+        entering = self.whole(theta)[:, self.row, self.before]
+        return np.where(self.inside, entering, self.coverage.fresh[:, self.row])
+
+    def span(self, step: float) -> float:
+        """Time [s] that solids spend in a moving cell over a pseudo-time step [s].
+
+        BDF1 storage as inflow: the storage of a step is one more stream of sites, of age `step`.
+        """
+        return 1.0 / (1.0 / step + 1.0 / self.residence)
+
+    def entering(self, step: float, theta: Floats, old: Floats) -> Floats:
+        """Coverage with which solids come in, that stream included, (sites, moving); collective."""
+        span = self.span(step)
+        return span / self.residence * self.incoming(theta) + span / step * old[:, self.moving]
+
+    def passed(self, theta: Floats) -> Floats:
+        """Sites that leave the strip less those that enter it, per second and kind [mol/m/s]; collective."""
+        coverage = self.coverage
+        if not self.runs or coverage.periodic:
+            return np.zeros(len(theta))
+        carried = coverage.capacity[self.moving] / self.residence
+        last, first = self.column == self._last, self.column == self._first
+        gone = theta[:, self.moving][:, last] @ carried[last]
+        return total(self.comm, gone - self.incoming(theta)[:, first] @ carried[first])
+
+    def carry(
+        self, surface: SurfaceKinetics, concentration: Floats, theta: Floats, old: Floats, step: float
+    ) -> Floats:
+        """Coverages (sites, reactive cells) with those of moving cells at these concentrations (coupled, reactive cells): theta_out of
+        every cell from the one before it; collective.
+
+        In every cell theta_out = M theta_in with a stochastic M, so the coverage stays within [0, 1]. Periodic solids come in as they
+        left: the fixed point of the product of all M.
+        """
+        if not self.runs:
+            return theta
+        coverage, kinds, moving = self.coverage, len(theta), self.moving
+        span = self.span(step)
+        share = span / self.residence
+        part, c = surface.part(moving), concentration[:, moving]
+        unit = np.eye(kinds)
+        responses = [part.conveyed(c, np.repeat(e[:, None], len(moving), axis=1), span).out for e in unit]
+        local = np.zeros((kinds * kinds + kinds, len(coverage.cells)))
+        local[: kinds * kinds, moving] = np.concatenate(responses)  # column by column of M
+        local[kinds * kinds :, moving] = old[:, moving]
+        whole = self.whole(local)[:, coverage.moving_rows]
+        maps = np.moveaxis(
+            whole[: kinds * kinds].reshape(kinds, kinds, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0)
+        )  # (columns, rows, out, in)
+        aged = (1.0 - share) * np.moveaxis(
+            whole[kinds * kinds :], (0, 1, 2), (2, 1, 0)
+        )  # (columns, rows, sites)
+        way = self.direction  # columns in the order in which solids meet them
+        left = np.empty_like(aged)
+        left[::way] = _along(
+            maps[::way], aged[::way], share, coverage.fresh[:, coverage.moving_rows].T, coverage.periodic
+        )
+        result = np.zeros((kinds, len(coverage.rows), coverage.columns))
+        result[:, coverage.moving_rows] = np.moveaxis(left, (0, 1, 2), (2, 1, 0))
+        new = theta.copy()
+        new[:, moving] = coverage.scatter.to_local(result.reshape(kinds, -1))[:, moving]
+        return new
+
+
+def _along(maps: Floats, aged: Floats, share: float, fresh: Floats, periodic: bool) -> Floats:
+    """Coverages (columns, rows, sites) that leave column after column: theta = M (share theta_before + aged)."""
+    incoming = _fixed_point(maps, aged, share, fresh) if periodic else fresh
+    left = np.empty_like(aged)
+    for column, (m, more) in enumerate(zip(maps, aged, strict=True)):
+        incoming = np.einsum("roi,ri->ro", m, share * incoming + more)
+        incoming = np.maximum(incoming, 0.0)
+        incoming = left[column] = incoming / incoming.sum(
+            axis=1, keepdims=True
+        )  # rounding would add up along the bed
+    return left
+
+
+def _fixed_point(maps: Floats, aged: Floats, share: float, start: Floats) -> Floats:
+    """Coverage (rows, sites) that the solids bring back after one turn: theta = A theta + c of all columns together."""
+    kinds = maps.shape[-1]
+    product = np.broadcast_to(np.eye(kinds), maps.shape[1:]).copy()
+    constant = np.zeros(maps.shape[1:3])
+    for m, more in zip(maps, aged, strict=True):
+        product = share * m @ product
+        constant = np.einsum("roi,ri->ro", m, share * constant + more)
+    theta = start.copy()
+    for row in range(len(product)):
+        gap = np.eye(kinds) - product[row]
+        theta[row] = np.linalg.lstsq(np.vstack([gap, np.ones(kinds)]), np.append(constant[row], 1.0))[0]
+    return theta

@@ -1,0 +1,228 @@
+"""The coupled parts of a reactor and one step of them: mesh, motion, flow, coverage, species. No files, no clock, no log."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.errors import ConvergenceError, InputError
+from mpm.flow.sequence import CyclicFlow, MarchedFlow, Watch
+from mpm.mesh.strip import Strip
+from mpm.motion.kinematics import BedMotion, step_motion
+from mpm.motion.schedule import RESTING, Schedule, Step
+from mpm.numerics import fem
+from mpm.parallel import on_root, total
+from mpm.reactor import records
+from mpm.reactor.flow import Flow, conditions, dispersed, find_flow, taken_over
+from mpm.report.records import State, Totals
+from mpm.transport.coverage import Coverage
+from mpm.transport.species import Operators, Transport
+
+from mpi4py import MPI  # isort: skip  (after fem)
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+    from mpm.flow.fields import FlowField
+
+Floats = NDArray[np.float64]
+
+
+class System:
+    """One case on the ranks of `comm`; all methods that look at it or change it are collective.
+
+    `sites_initially` (site species,) and `stored_initially` (species,) [mol/m] are what balances count from.
+    """
+
+    def __init__(self, case: Case, comm: MPI.Comm):
+        self.case, self.comm = case, comm
+        on_root(comm, fem.check_cache)
+        self.schedule = Schedule.from_case(case)
+        self.strip = Strip(case, comm)
+        self.grid = self.strip.grid
+        self.bed_motion = BedMotion(case.motion)
+        self.coverage = Coverage(case, self.strip)
+        self.transport = Transport(case, self.strip, self.coverage)
+        self._flow: Flow | None = None
+        self._operators: dict[FlowField, Operators] = {}
+        self.count_from_here()
+
+    def count_from_here(self) -> None:
+        """Let balances count from the present contents."""
+        self.sites_initially = total(self.comm, self.coverage.content())
+        self.stored_initially = self.stored_gas()
+
+    def stored_gas(self) -> Floats:
+        """What the gas holds of each species, (species,) [mol/m]."""
+        return total(self.comm, self.transport.concentration @ self.transport.reactions.gas_volume)
+
+    # --- flow ---
+
+    @property
+    def flow(self) -> Flow:
+        """The flow of the run; found when it is first asked for. Raises ConvergenceError."""
+        if self._flow is None:
+            return self.find_flow()
+        return self._flow
+
+    @property
+    def has_flow(self) -> bool:
+        """Whether the flow is there, with all that the case asks for."""
+        return self._flow is not None
+
+    def find_flow(self, watch: Watch | None = None, known: Flow | None = None) -> Flow:
+        """Find the flow, unless that of another reactor is `known`, and the dispersion that the case asks for.
+
+        `watch(cycle, change)` is called meanwhile. Raises ConvergenceError, and InputError for a flow that is not this case's.
+        """
+        case, strip, motion = self.case, self.strip, self.bed_motion
+        if known is None:
+            known = find_flow(case, strip, motion, self.schedule, watch)
+        else:
+            known = taken_over(known, case, self.schedule)
+        flow = dispersed(known, case, strip, motion, self.transport.diffusivities, watch)
+        self._use(flow)
+        return flow
+
+    def _use(self, flow: Flow, steps: int = 0) -> None:
+        self._flow = flow
+        if flow.dispersion is not None:
+            self.transport.disperse(flow.dispersion)
+        self._velocity = flow.sequence.shown(self.schedule.step(max(steps - 1, 0)))
+
+    @property
+    def velocity(self) -> FlowField:
+        """The velocity field of the step last taken; before the first one that with which it begins."""
+        _ = self.flow
+        return self._velocity
+
+    def operators(self, velocity: FlowField, at_rest: bool = False) -> Operators:
+        """The species' operators in a velocity field; those of a cycle that repeats are kept."""
+        if velocity not in self._operators:
+            if isinstance(self.flow.sequence, MarchedFlow):
+                self._operators.clear()  # no field comes again
+            self._operators[velocity] = self.transport.operators(velocity, at_rest)
+        return self._operators[velocity]
+
+    # --- one step ---
+
+    def advance(self, step: Step) -> None:
+        """One step: the gas moves, the bed slides, then species and coverage follow over the new position.
+
+        Raises ConvergenceError; everything but the flow is then as before.
+        """
+        before = self.coverage.memento()
+        try:
+            velocity = self.flow.sequence.at(step)
+            self.coverage.slide(self._slide(step))
+            self.transport.advance(self.operators(velocity, step.phase == RESTING), step.t0, step.dt)
+        except ConvergenceError as error:
+            self.coverage.recall(before)
+            raise ConvergenceError(f"step {step.index + 1}: {error}") from error
+        self._velocity = velocity
+
+    def _slide(self, step: Step) -> float:
+        """How far the bed slides over the mesh during `step` [m]: with the mean velocity where the flow is a mean, too.
+
+        Steps that sample the vibration only now and then would shake some columns back into a cell and hurry others past it.
+        """
+        if step.since < 0.0:
+            return 0.0
+        if self.schedule.phases == 1:
+            return self.bed_motion.mean * step.dt
+        return step_motion(self.bed_motion, step.since, step.since + step.dt).slide
+
+    # --- looking ---
+
+    def totals(self) -> Totals:
+        """What has passed so far, summed over all ranks."""
+        return records.totals(self)
+
+    def state(self) -> State:
+        """Coverage, dosed species and gas reaction rates now."""
+        return records.state(self)
+
+    def fields(self) -> dict[str, Floats]:
+        """All cell fields for the files, in the grid's order, on rank 0 (empty elsewhere)."""
+        local = records.local_fields(self)
+        values = self.strip.scatter.to_root(np.stack(list(local.values())))
+        if values is None:
+            return {}
+        fields = dict(zip(local, values, strict=True))
+        x, y = fields.pop("velocity_x"), fields.pop("velocity_y")
+        return {**fields, "velocity": np.column_stack([x, y])}
+
+    def field(self, name: str) -> Floats:
+        """One cell field as (rows, columns) on every rank, or (rows, columns, 2) for `velocity`.
+
+        Names are those of the files: C_TMA, x_CH4, theta_OH, cvd_rate, velocity, pressure. Raises InputError for another.
+        """
+        local = records.local_fields(self)
+        shape = (self.grid.rows, self.grid.columns)
+        if name == "velocity":
+            both = self.strip.scatter.to_all(np.stack([local["velocity_x"], local["velocity_y"]]))
+            return np.moveaxis(both.reshape(2, *shape), 0, -1)
+        if name not in local:
+            raise InputError(
+                f"no field {name!r}; there are velocity, {', '.join(n for n in local if 'velocity' not in n)}"
+            )
+        return self.strip.scatter.to_all(local[name]).reshape(shape)
+
+    def coverage_of(self, layer: str, site: str) -> Floats:
+        """Coverage of `site` in `layer` as (rows, columns), bottom row first. Raises InputError for unknown names."""
+        sites = self.case.mechanism.site_names
+        if layer not in self.grid.layer_names:
+            raise InputError(f"no layer {layer!r}; there are {', '.join(self.grid.layer_names)}")
+        if site not in sites:
+            raise InputError(f"no site {site!r}; there are {', '.join(sites)}")
+        rows = self.grid.layer_rows(layer)
+        chosen = (self.coverage.rows >= rows.start) & (self.coverage.rows < rows.stop)
+        return np.asarray(self.coverage.whole()[sites.index(site)][chosen])
+
+    # --- restart ---
+
+    def stored(self) -> dict[str, Any]:
+        """Arrays of a restart state, `part.name`, in grid order on rank 0 (None elsewhere for gathered ones)."""
+        transport, scatter, sequence = self.transport, self.strip.scatter, self.flow.sequence
+        dispersion = self.flow.dispersion
+        parts: dict[str, dict[str, Any]] = {
+            "species": {"concentration": scatter.to_root(transport.concentration)},
+            "ledger": transport.ledger.stored(self.comm, scatter, self.coverage.scatter),
+            "coverage": self.coverage.stored(),
+            "flow": {"fields": scatter.to_root(sequence.stored(self.strip.owned))},
+            "initially": {"sites": self.sites_initially, "stored": self.stored_initially},
+        }
+        if isinstance(sequence, MarchedFlow):
+            parts["flow"]["done"] = sequence.done
+        if dispersion is not None:
+            parts["flow"]["dispersion"] = scatter.to_root(dispersion[:, :, : self.strip.owned])
+        return {f"{part}.{name}": value for part, values in parts.items() for name, value in values.items()}
+
+    def restore(self, stored: dict[str, Any], steps: int) -> None:
+        """The inverse of `stored`, on every rank of a system freshly built for the same case that has taken `steps`."""
+        parts: dict[str, dict[str, Any]] = {}
+        for name, value in stored.items():
+            part, _, inside = name.partition(".")
+            parts.setdefault(part, {})[inside] = value
+        transport, strip = self.transport, self.strip
+        transport.concentration = strip.scatter.to_local(parts["species"]["concentration"])
+        transport.ledger.restore(self.comm, strip.scatter, self.coverage.scatter, parts["ledger"])
+        self.coverage.restore(parts["coverage"])
+        self.sites_initially, self.stored_initially = (
+            parts["initially"]["sites"],
+            parts["initially"]["stored"],
+        )
+        self._use(self._restored_flow(parts["flow"]), steps)
+
+    def _restored_flow(self, stored: dict[str, Any]) -> Flow:
+        known = conditions(self.case, self.schedule)
+        if "done" in stored:
+            marched = MarchedFlow(self.case, self.strip, self.bed_motion, self.schedule)
+            marched.restore(stored["fields"], int(stored["done"]))
+            return Flow(marched, known)
+        cyclic = CyclicFlow.restored(self.strip, stored["fields"], self.schedule.resting_steps > 0)
+        if "dispersion" not in stored:
+            return Flow(cyclic, known)
+        dispersion = stored["dispersion"][:, :, self.strip.cell]
+        return Flow(cyclic, known, dispersion, tuple(self.transport.diffusivities))

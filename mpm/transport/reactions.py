@@ -1,0 +1,109 @@
+"""What reactions make of the gas in each cell, and how that changes with the gas: the source of the species' balance.
+
+    s_i = eps V sum_r nu_ir R_r^gas + S V sum_r nu_ir r_r        [mol/m/s], per metre of depth
+
+Rates come from `mpm.physics.kinetics`; here they meet the cells: volumes of gas, reactive area and stoichiometry. One time step and the
+steady state share it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mpm.mesh.strip import Strip
+from mpm.physics.kinetics import GasKinetics, Roles, SurfaceKinetics, stoichiometry
+from mpm.transport.coverage import Coverage
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from mpm.case.case import Case
+    from mpm.physics.kinetics import Reaction
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Events:
+    """How often reactions run [mol/m/s]: `surface` (reactions, reactive cells), `gas` (reactions, own cells)."""
+
+    surface: Floats
+    gas: Floats
+
+
+class Reactions:
+    """The reactions that run on the coverages and in the own cells of a strip, among the species of `roles`.
+
+    `surface` and `gas` are their kinetics; `species` the names of all species that run, reacting ones first.
+    """
+
+    def __init__(self, case: Case, strip: Strip, coverage: Coverage, roles: Roles):
+        self.strip, self.coverage = strip, coverage
+        self.species, self.coupled = (*roles.coupled, *roles.products), len(roles.coupled)
+        temperature = case.gas.temperature
+        self.surface = SurfaceKinetics(
+            case.mechanism, roles.coupled, coverage.surface, coverage.sites, temperature
+        )
+        self.gas = GasKinetics(case.mechanism, roles.coupled, temperature)
+        self._nu_surface = self._stoichiometry(self.surface.reactions)
+        self._nu_gas = self._stoichiometry(self.gas.reactions)
+
+    def _stoichiometry(self, reactions: Sequence[Reaction]) -> Floats:
+        """nu (reactions, species), per event."""
+        rows = [[stoichiometry(r).get(name, 0.0) for name in self.species] for r in reactions]
+        return np.array(rows).reshape(len(reactions), len(self.species))
+
+    @property
+    def gas_volume(self) -> Floats:
+        """Volume of the gas in own cells [m2]."""
+        return self.strip.gas_volume[: self.strip.owned]
+
+    def none(self) -> Events:
+        """No reaction anywhere."""
+        return Events(
+            np.zeros((len(self._nu_surface), len(self.coverage.cells))),
+            np.zeros((len(self._nu_gas), self.strip.owned)),
+        )
+
+    def events(self, surface_rates: Floats, gas_rates: Floats) -> Events:
+        """From rates per area (reactions, reactive cells) [mol/m2/s] and per volume of gas (reactions, own) [mol/m3/s]."""
+        return Events(surface_rates * self.coverage.area, gas_rates * self.gas_volume)
+
+    def made(self, events: Events) -> Floats:
+        """What they make of every species, (species, own) [mol/m/s]."""
+        made = self._nu_gas.T @ events.gas
+        made[:, self.coverage.cells] += self._nu_surface.T @ events.surface
+        return made
+
+    def slopes(self, surface_slopes: Floats, gas_slopes: Floats) -> Floats:
+        """d `made` / dC of the coupled species, (own, coupled, coupled) [m2/s], from those of the rates (reactions, coupled, n)."""
+        slopes = _slopes(self._nu_gas[:, : self.coupled], gas_slopes, self.gas_volume)
+        slopes[self.coverage.cells] += _slopes(
+            self._nu_surface[:, : self.coupled], surface_slopes, self.coverage.area
+        )
+        return slopes
+
+    def slopes_by_coverage(self, slopes: Floats, chosen: Ints) -> Floats:
+        """d `made` / d theta in `chosen` reactive cells, (chosen, coupled, sites), from those of the rates (reactions, sites, chosen)."""
+        return _slopes(self._nu_surface[:, : self.coupled], slopes, self.coverage.area[chosen])
+
+    def on_surfaces(self, chosen: Ints, rates: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+        """What is made of coupled species in `chosen` reactive cells (coupled, n), and its derivatives (n, coupled, coupled)."""
+        nu, area = self._nu_surface[:, : self.coupled], self.coverage.area[chosen]
+        return nu.T @ rates * area, _slopes(nu, slopes, area)
+
+    def in_gas(self, cells: Ints, concentration: Floats) -> tuple[Floats, Floats]:
+        """The same in the gas of own `cells` at these concentrations (coupled, n)."""
+        nu, volume = self._nu_gas[:, : self.coupled], self.gas_volume[cells]
+        rates, slopes = self.gas.rates(concentration)
+        return nu.T @ rates * volume, _slopes(nu, slopes, volume)
+
+
+def _slopes(nu: Floats, slopes: Floats, size: Floats) -> Floats:
+    """sum_r nu_ri slopes_rj, per cell and times its size: (n, i, j) from (reactions, i) and (reactions, j, n)."""
+    return np.asarray(np.einsum("ri,rjn->nij", nu, slopes) * size[:, None, None])
