@@ -22,6 +22,7 @@ from mpm.errors import InputError
 from mpm.files import read_text
 from mpm.output.directory import RunDirectory
 from mpm.parallel import on_root
+from mpm.reactor.records import totals
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -86,7 +87,7 @@ def restore(course: Course, arrays: Arrays, meta: dict[str, Any]) -> None:
     course.system.restore({k: v for k, v in arrays.items() if not k.startswith("before.")}, clock.steps)
     if "before.out" in arrays:
         then: dict[str, Any] = {name: arrays[f"before.{name}"] for name in BEFORE}
-        course.before = replace(course.system.totals(), **{**then, "slid": float(then["slid"])})
+        course.before = replace(totals(course.system), **{**then, "slid": float(then["slid"])})
 
 
 def check_same_case(directory: RunDirectory, case: Case, state: State | None) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mpm.output.history import Row
+from mpm.reactor import records
 from mpm.reactor.clock import Clock
 from mpm.report.contents import row_of
 from mpm.report.records import Records, Totals
@@ -34,14 +35,16 @@ class Course:
 
     def records(self) -> Records:
         """What a row of the history is made of, now."""
-        system = self.system
-        return Records(self.case, system.grid, self.clock.time, system.totals(), system.state(), self.before)
+        system, now = self.system, self.clock.time
+        return Records(
+            self.case, system.grid, now, records.totals(system), records.state(system), self.before
+        )
 
     def record(self) -> None:
         """Add a row to the history."""
-        records = self.records()
-        self.before = records.totals
-        self.go_on_from([*self.rows, row_of(records)])
+        now = self.records()
+        self.before = now.totals
+        self.go_on_from([*self.rows, row_of(now)])
 
     def go_on_from(self, rows: list[Row]) -> None:
         """Make `rows` the history so far."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mpm.mesh.grid import Grid
 from mpm.output.history import Row, columns_of
+from mpm.reactor import records
 from mpm.reactor.checkpoint import identity
 from mpm.reactor.course import Course
 from mpm.reactor.flow import Flow
@@ -107,23 +108,23 @@ class Reactor:
 
     def totals(self) -> Totals:
         """What has passed so far, summed over all ranks; collective."""
-        return self.system.totals()
+        return records.totals(self.system)
 
     def state(self) -> State:
         """Coverage, dosed species and gas reaction rates now; collective."""
-        return self.system.state()
+        return records.state(self.system)
 
     def fields(self) -> dict[str, Floats]:
         """All cell fields for the files, in the grid's order, on rank 0 (empty elsewhere); collective."""
-        return self.system.fields()
+        return records.fields(self.system)
 
     def field(self, name: str) -> Floats:
         """One cell field as (rows, columns) on every rank, or (rows, columns, 2) for `velocity`; collective.
 
         Names are those of the files: C_TMA, x_CH4, theta_OH, cvd_rate, velocity, pressure. Raises InputError for another.
         """
-        return self.system.field(name)
+        return records.field(self.system, name)
 
     def coverage(self, layer: str, site: str) -> Floats:
         """Coverage of `site` in `layer` as (rows, columns), bottom row first; collective. Raises InputError for unknown names."""
-        return self.system.coverage_of(layer, site)
+        return records.coverage(self.system, layer, site)

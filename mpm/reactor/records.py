@@ -1,4 +1,4 @@
-"""What a system holds, gathered from all ranks for reports and files; every function is collective."""
+"""What a system holds, gathered from all ranks for reports, files and people; every function is collective."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.errors import InputError
 from mpm.parallel import largest, total
 from mpm.report.records import State, Totals
 
@@ -88,3 +89,43 @@ def local_fields(system: System) -> dict[str, Floats]:
     fields["velocity_x"], fields["velocity_y"] = velocity.in_cells(own)
     fields["pressure"] = velocity.pressure[:own]
     return fields
+
+
+def fields(system: System) -> dict[str, Floats]:
+    """All cell fields for the files, in the grid's order, on rank 0 (empty elsewhere)."""
+    local = local_fields(system)
+    values = system.strip.scatter.to_root(np.stack(list(local.values())))
+    if values is None:
+        return {}
+    whole = dict(zip(local, values, strict=True))
+    x, y = whole.pop("velocity_x"), whole.pop("velocity_y")
+    return {**whole, "velocity": np.column_stack([x, y])}
+
+
+def field(system: System, name: str) -> Floats:
+    """One cell field as (rows, columns) on every rank, or (rows, columns, 2) for `velocity`.
+
+    Names are those of the files: C_TMA, x_CH4, theta_OH, cvd_rate, velocity, pressure. Raises InputError for another.
+    """
+    local, scatter = local_fields(system), system.strip.scatter
+    shape = (system.grid.rows, system.grid.columns)
+    if name == "velocity":
+        both = scatter.to_all(np.stack([local["velocity_x"], local["velocity_y"]]))
+        return np.moveaxis(both.reshape(2, *shape), 0, -1)
+    if name not in local:
+        raise InputError(
+            f"no field {name!r}; there are velocity, {', '.join(n for n in local if 'velocity' not in n)}"
+        )
+    return scatter.to_all(local[name]).reshape(shape)
+
+
+def coverage(system: System, layer: str, site: str) -> Floats:
+    """Coverage of `site` in `layer` as (rows, columns), bottom row first. Raises InputError for unknown names."""
+    sites, solids = system.case.mechanism.site_names, system.coverage
+    if layer not in system.grid.layer_names:
+        raise InputError(f"no layer {layer!r}; there are {', '.join(system.grid.layer_names)}")
+    if site not in sites:
+        raise InputError(f"no site {site!r}; there are {', '.join(sites)}")
+    rows = system.grid.layer_rows(layer)
+    chosen = (solids.rows >= rows.start) & (solids.rows < rows.stop)
+    return np.asarray(solids.whole()[sites.index(site)][chosen])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from mpm.output.results import LastInstant, Run, load_run
 from mpm.page import report
 from mpm.parallel import on_root
 from mpm.pictures.figures import figure_of
+from mpm.reactor import records
 from mpm.report.notebook import result_html
 from mpm.report.verdict import verdict
 
@@ -28,7 +30,9 @@ class Result:
         system = course.system
         self.case, self.time, self.grid = course.case, course.clock.time, system.grid
         self.history = columns_of(course.rows)
-        self.fields, self.field, self.coverage = system.fields, system.field, system.coverage_of
+        self.fields = partial(records.fields, system)
+        self.field = partial(records.field, system)
+        self.coverage = partial(records.coverage, system)
         self._comm = course.comm
 
     def plot(self, name: str | None = None, **options: Any) -> Figure:

@@ -12,6 +12,7 @@ from mpm.errors import ConvergenceError, Interrupted, StorageError, printable, s
 from mpm.output.directory import FAILED
 from mpm.parallel import is_root, largest
 from mpm.reactor.progress import FLOW, Progress, log_file
+from mpm.reactor.records import totals
 from mpm.reactor.steady.solver import steady_problem
 from mpm.reactor.summary import summarise
 from mpm.report.balances import LIMIT, require_balance, worst_balance
@@ -97,7 +98,7 @@ class Run:
                 self._record()
                 self._keep()  # the flow may have taken minutes
             self._march()
-            require_balance(self.case, self.system.totals())
+            require_balance(self.case, totals(self.system))
         except (ConvergenceError, Interrupted) as error:
             self._give_up(error)
             raise
@@ -184,7 +185,7 @@ class Run:
             problem.hand_over()
             self.clock.steps = problem.iterations
             self.system.count_from_here()
-            require_balance(self.case, self.system.totals())
+            require_balance(self.case, totals(self.system))
         except ConvergenceError as unbalanced:
             error = error or unbalanced
         if error is not None:
@@ -207,7 +208,7 @@ class Run:
     def _keep(self) -> None:
         """Write the restart state. Raises BalanceError when it is out of balance: then the last good one stays."""
         if self.writer.directory is not None:
-            require_balance(self.case, self.system.totals())
+            require_balance(self.case, totals(self.system))
             self.writer.keep()
 
     def _give_up(self, error: ConvergenceError | Interrupted) -> None:
@@ -215,7 +216,7 @@ class Run:
         _log_end(error)
         if self.writer.directory is None or not self.system.has_flow:
             return
-        if worst_balance(self.case, self.system.totals())[1] <= LIMIT:
+        if worst_balance(self.case, totals(self.system))[1] <= LIMIT:
             self.writer.keep()
         self._sum_up(_status(error))
 

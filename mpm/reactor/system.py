@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.errors import ConvergenceError, InputError
+from mpm.errors import ConvergenceError
 from mpm.flow.sequence import CyclicFlow, MarchedFlow, Watch
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
 from mpm.numerics import fem
 from mpm.parallel import on_root, total
-from mpm.reactor import records
 from mpm.reactor.flow import Flow, conditions, dispersed, find_flow, taken_over
-from mpm.report.records import State, Totals
 from mpm.transport.coverage import Coverage
 from mpm.transport.species import Operators, Transport
 
@@ -132,53 +130,6 @@ class System:
         if self.schedule.phases == 1:
             return self.bed_motion.mean * step.dt
         return step_motion(self.bed_motion, step.since, step.since + step.dt).slide
-
-    # --- looking ---
-
-    def totals(self) -> Totals:
-        """What has passed so far, summed over all ranks."""
-        return records.totals(self)
-
-    def state(self) -> State:
-        """Coverage, dosed species and gas reaction rates now."""
-        return records.state(self)
-
-    def fields(self) -> dict[str, Floats]:
-        """All cell fields for the files, in the grid's order, on rank 0 (empty elsewhere)."""
-        local = records.local_fields(self)
-        values = self.strip.scatter.to_root(np.stack(list(local.values())))
-        if values is None:
-            return {}
-        fields = dict(zip(local, values, strict=True))
-        x, y = fields.pop("velocity_x"), fields.pop("velocity_y")
-        return {**fields, "velocity": np.column_stack([x, y])}
-
-    def field(self, name: str) -> Floats:
-        """One cell field as (rows, columns) on every rank, or (rows, columns, 2) for `velocity`.
-
-        Names are those of the files: C_TMA, x_CH4, theta_OH, cvd_rate, velocity, pressure. Raises InputError for another.
-        """
-        local = records.local_fields(self)
-        shape = (self.grid.rows, self.grid.columns)
-        if name == "velocity":
-            both = self.strip.scatter.to_all(np.stack([local["velocity_x"], local["velocity_y"]]))
-            return np.moveaxis(both.reshape(2, *shape), 0, -1)
-        if name not in local:
-            raise InputError(
-                f"no field {name!r}; there are velocity, {', '.join(n for n in local if 'velocity' not in n)}"
-            )
-        return self.strip.scatter.to_all(local[name]).reshape(shape)
-
-    def coverage_of(self, layer: str, site: str) -> Floats:
-        """Coverage of `site` in `layer` as (rows, columns), bottom row first. Raises InputError for unknown names."""
-        sites = self.case.mechanism.site_names
-        if layer not in self.grid.layer_names:
-            raise InputError(f"no layer {layer!r}; there are {', '.join(self.grid.layer_names)}")
-        if site not in sites:
-            raise InputError(f"no site {site!r}; there are {', '.join(sites)}")
-        rows = self.grid.layer_rows(layer)
-        chosen = (self.coverage.rows >= rows.start) & (self.coverage.rows < rows.stop)
-        return np.asarray(self.coverage.whole()[sites.index(site)][chosen])
 
     # --- restart ---
 

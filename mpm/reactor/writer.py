@@ -10,7 +10,7 @@ from mpm.output.directory import RunDirectory
 from mpm.output.history import Row
 from mpm.output.phases import LastCycle, phase_fields
 from mpm.parallel import is_root, on_root
-from mpm.reactor import checkpoint
+from mpm.reactor import checkpoint, records
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,7 +84,7 @@ class Writer:
         directory, course = self.directory, self.course
         if directory is None:
             return
-        fields = course.system.fields()
+        fields = records.fields(course.system)
 
         def write() -> None:
             directory.append_history(course.numbers)
@@ -99,7 +99,7 @@ class Writer:
         number = self.last_cycle.number(step)
         if directory is None or number is None:
             return
-        usual = system.fields()
+        usual = records.fields(system)
 
         def write() -> None:
             fields = phase_fields(usual, system.case, system.grid, motion, step)
