@@ -26,6 +26,7 @@ WITHOUT_NUMBERS = (
     *("advice/screen.py", "advice/sheet.py", "advice/sketch.py"),
     *(
         "report/fieldnames.py",
+        "report/rounding.py",
         "report/tables.py",
         "report/verdict.py",
         "report/notebook.py",

@@ -18,7 +18,7 @@ from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.reactor.reactor import Reactor, Result
 from mpm.report.quantities import quantity
-from mpm.report.tables import shown
+from mpm.report.rounding import shown
 from mpm.report.trees import flatten
 
 from .cases import MPI, SHORT, TINY, zone

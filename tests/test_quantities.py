@@ -1,22 +1,84 @@
-"""The table of reported numbers: every number that a run writes has a name in words, a unit and a meaning."""
+"""The table of reported numbers: all that a run writes stands in it, and all that stands in it a run writes."""
+
+import sys
+from pathlib import Path
 
 import pytest
 
 from mpm import Reactor, load_case
-from mpm.report.quantities import QUANTITIES, known, quantity
+from mpm.page.numbers import TERMS, accounts, errors, groups
+from mpm.reactor.result import Result
+from mpm.report.quantities import HEADINGS, QUANTITIES, SECTIONS, entry, files_of, quantity
 from mpm.report.quantity import RATIO
-from mpm.report.trees import flatten
+from mpm.report.trees import flatten, nest
 from tests.cases import COARSE
 
+ROOT = Path(__file__).parents[1]
 
-@pytest.mark.parametrize("case", ["single_zone", "single_cycle"])
-def test_every_number_of_a_run_is_in_the_table(case: str) -> None:
-    """Fails when summary.json or history.csv report a number that no screen can name."""
-    coarse = {**COARSE, "geometry.cell_width": "4 mm", "time.end": "0.3 s", "time.step": "0.1 s"}
-    result = Reactor(load_case(case, coarse)).run()
-    names = [name for name in (*flatten(result.summary), *result.history) if not name.startswith("versions.")]
-    assert len(names) > 50
-    assert [name for name in names if not known(name)] == []
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Result]:
+    """A zone and a cycle in time, and the cycle's steady state."""
+    coarse = {**COARSE, "geometry.cell_width": "4 mm"}
+    short = {**coarse, "time.end": "0.3 s", "time.step": "0.1 s"}
+    cases = {
+        "zone": load_case("single_zone", short),
+        "cycle": load_case("single_cycle", short),
+        "steady": load_case("single_cycle", {**coarse, "fidelity": "steady"}),
+    }
+    return {name: Reactor(case).run() for name, case in cases.items()}
+
+
+@pytest.mark.parametrize("run", ["zone", "cycle", "steady"])
+def test_every_number_of_a_run_is_in_the_table(results: dict[str, Result], run: str) -> None:
+    """Fails when summary.json or history.csv hold a number without an entry, or with one that knows of another file only."""
+    held = {"summary.json": list(flatten(results[run].summary)), "history.csv": list(results[run].history)}
+    assert min(map(len, held.values())) > 25
+    assert [
+        (name, file) for file, names in held.items() for name in names if file not in files_of(name)
+    ] == []
+
+
+def test_every_entry_of_the_table_is_reported(results: dict[str, Result]) -> None:
+    """Fails when the table, and with it the documentation, promises a number that no run gives."""
+    names = {name for result in results.values() for name in (*flatten(result.summary), *result.history)}
+    given = {found.name for name in names if (found := entry(name)) is not None}
+    assert [number.name for number in QUANTITIES if number.name not in given] == []
+
+
+@pytest.mark.parametrize("run", ["zone", "cycle", "steady"])
+def test_the_report_page_tells_every_number(results: dict[str, Result], run: str) -> None:
+    """Fails when a section has no heading that the page knows: its numbers would be in the files and on no page."""
+    summary = results[run].summary
+    told = {row.name for _, rows in groups(summary) for row in rows} | {row.name for row in errors(summary)}
+    told |= {f"species.{account.species}.{term}" for account in accounts(summary) for term in TERMS}
+    numbers = flatten(summary)
+    silent = {name for name in numbers if quantity(name).profile or quantity(name).again}
+    silent |= {name for name in numbers if name.startswith("species.") and numbers[name] == 0.0}
+    assert set(numbers) - told - silent == set()
+
+
+def test_sections_stand_under_their_name_and_a_heading() -> None:
+    """Fails when a number would be looked for under another name than it is written, or a heading is misspelt."""
+    for section in SECTIONS:
+        assert section.heading in ("", *HEADINGS)
+        assert all(section.name in ("", number.name.split(".")[0]) for number in section.numbers)
+
+
+def test_the_table_of_the_documentation_is_that_of_the_program() -> None:
+    """Fails when a number, its unit or its meaning has changed since `python scripts/number_table.py` has written docs/output.md."""
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import number_table
+
+    document = (ROOT / "docs" / "output.md").read_text(encoding="utf-8")
+    assert number_table.number_table() in document and number_table.renewed(document) == document
+
+
+def test_a_row_becomes_a_tree_and_a_row_again() -> None:
+    """Fails when numbers lose their place between history.csv and summary.json."""
+    row = {"time": 1.0, "outlets.a.x.TMA": 0.5, "outlets.a.backflow": 0.0, "outlets.b.x.TMA": 0.25}
+    assert nest(row)["outlets"] == {"a": {"x": {"TMA": 0.5}, "backflow": 0.0}, "b": {"x": {"TMA": 0.25}}}
+    assert flatten(nest(row)) == row
 
 
 def test_units_for_people_are_the_same_dimension() -> None:

@@ -14,7 +14,7 @@ from mpm.case.keys import values
 from mpm.errors import InputError, printable
 from mpm.report.quantities import quantity
 from mpm.report.quantity import Quantity
-from mpm.report.tables import ROUNDING, TWICE, natural_scale
+from mpm.report.rounding import ROUNDING, natural_scale, without_rounding
 from mpm.report.trees import flatten
 from mpm.screen import Sheet, say, together
 
@@ -29,7 +29,6 @@ SAME = 1e-6
 CLOSED = 1e-9
 """The same of two balance errors, absolute."""
 _ABOUT_THE_COMPUTER = ("wall_seconds", "ranks")
-_ERRORS = ("balance_error", "mass_error")
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,8 @@ def changed_numbers(
     for name, steady in [*one, *(key for key in other if key not in one)]:
         a, b = one.get((name, steady)), other.get((name, steady))
         if not everything:
-            if name in (*_ABOUT_THE_COMPUTER, *TWICE) or name.rpartition(".")[0].endswith("_profile"):
+            what = quantity(name)
+            if name in _ABOUT_THE_COMPUTER or what.again or what.profile:
                 continue
             if _same_number(name, a, b, _scale(name, first, second)):
                 continue
@@ -142,7 +142,7 @@ def _scale(name: str, *summaries: Mapping[str, Any]) -> float:
 def _same_number(name: str, one: float | None, other: float | None, scale: float) -> bool:
     if one is None or other is None:
         return False
-    floor = CLOSED if name.endswith(_ERRORS) else ROUNDING * scale
+    floor = CLOSED if quantity(name).error else ROUNDING * scale
     return abs(one - other) <= max(SAME * max(abs(one), abs(other)), floor)
 
 
@@ -182,8 +182,7 @@ def print_comparison(one: Run, other: Run, everything: bool, console: Console) -
 def _beside(changed: ChangedNumber, scale: float) -> str:
     """Both values with their unit, 0 for what is rounding beside `scale`, and how much the second is more or less than the first."""
     values = [
-        0.0 if value is not None and abs(value) < ROUNDING * scale else value
-        for value in (changed.first, changed.second)
+        None if value is None else without_rounding(value, scale) for value in (changed.first, changed.second)
     ]
     texts = ["none" if value is None else f"{changed.quantity.of(value):.4g}" for value in values]
     text = together(f"{' -> '.join(texts)} {changed.quantity.unit_shown}".strip())

@@ -14,7 +14,7 @@ from mpm.files import read_text
 from mpm.output.directory import RunDirectory
 from mpm.output.history import read_table
 from mpm.report.quantities import quantity
-from mpm.report.tables import shown
+from mpm.report.rounding import shown
 from mpm.screen import duration
 
 SHOWN = ("titration.*.exit_mean", "titration.*.box_mean", "cvd.rate_mean")
@@ -34,10 +34,9 @@ class Look:
         """What a person reads: how far it is, then a number each."""
         ago = f" ({duration(self.age)} ago)" if self.age >= 2.0 else ""
         names = [name for pattern in SHOWN for name in self.numbers if fnmatch(name, pattern)]
-        numbers = dict(self.numbers)
         return [
             self.line + ago,
-            *(f"{quantity(name).label}: {shown(name, numbers, False)}" for name in names),
+            *(f"{quantity(name).label}: {shown(name, self.numbers, False)}" for name in names),
         ]
 
 

@@ -18,7 +18,7 @@ from mpm.page.viewer import BUDGET, VALUES, looks, viewer
 from mpm.page.write import render
 from mpm.report.fieldnames import superscript
 from mpm.report.quantity import Quantity
-from mpm.report.tables import natural_scale
+from mpm.report.rounding import natural_scale
 from mpm.report.trees import flatten
 
 MOST_RUNS = 6
@@ -131,7 +131,7 @@ def _number_line(what: Quantity, numbers: Sequence[Mapping[str, float]]) -> Chan
     """Values of one number in every run, and how far they are from the first; what is rounding in its run is 0."""
     values = [found.get(what.name) for found in numbers]
     texts = [
-        "" if value is None else rounded(what, value, natural_scale(what.name, dict(found)))
+        "" if value is None else rounded(what, value, natural_scale(what.name, found))
         for value, found in zip(values, numbers, strict=True)
     ]
     first = values[0]

@@ -6,28 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mpm.report.balances import TERMS
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import quantity
+from mpm.report.quantities import headed, quantity
 from mpm.report.quantity import Quantity
-from mpm.report.tables import ROUNDING, natural_scale
+from mpm.report.rounding import natural_scale, without_rounding
 from mpm.report.trees import flatten
-
-GROUPS = (
-    ("What leaves coated", ("titration.",)),
-    ("What was dosed, what was used", ("dose_ratio.", "excess_number.", "utilisation.")),
-    ("Parasitic growth and precursor astray", ("cvd.", "contamination.")),
-    ("Film", ("film.",)),
-    ("Gas flow", ("flow.",)),
-    ("Gas in the outlets", ("outlets.",)),
-    ("Fronts", ("front.",)),
-    ("Time and cost", ("simulated_seconds", "wall_seconds", "steps", "cells", "ranks")),
-)
-"""Headings, and the dotted names below them."""
-BALANCE_ERRORS = ("balance_error", "mass_error")
-TWICE = ("flow.bed_pressure_drop", "flow.frit_pressure_drop")
-"""Also reported by the name of their layer."""
-TERMS = ("fed", "produced", "reacted", "left", "stored")
-"""Of a species' balance: fed + produced = reacted + left + stored."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +42,8 @@ def shown(value: float, digits: int = 4) -> str:
 
 
 def rounded(what: Quantity, value: float, scale: float) -> str:
-    """A value in the unit that people read; less than ROUNDING of `scale` is 0."""
-    return "0" if abs(value) <= ROUNDING * scale else shown(what.of(value))
+    """A value in the unit that people read; what is rounding beside `scale` is 0."""
+    return shown(what.of(without_rounding(value, scale)))
 
 
 def row(name: str, value: float, steady: bool, scale: float = 0.0) -> Row:
@@ -70,21 +54,11 @@ def row(name: str, value: float, steady: bool, scale: float = 0.0) -> Row:
 
 def groups(summary: Mapping[str, Any]) -> list[tuple[str, list[Row]]]:
     """All numbers of a summary but balances and profiles, under their headings."""
-    steady = summary.get("fidelity") == "steady"
-    numbers = flatten(summary)
-    found = []
-    for title, prefixes in GROUPS:
-        rows = [
-            row(name, value, steady, natural_scale(name, numbers))
-            for name, value in numbers.items()
-            if name.startswith(prefixes)
-            and ".exit_profile." not in name
-            and not name.endswith(BALANCE_ERRORS)
-            and not (name in TWICE and "pressure_drop" in summary.get("flow", {}))
-        ]
-        if rows:
-            found.append((title, rows))
-    return found
+    steady, numbers = summary.get("fidelity") == "steady", flatten(summary)
+    return [
+        (heading, [row(name, numbers[name], steady, natural_scale(name, numbers)) for name in names])
+        for heading, names in headed(numbers)
+    ]
 
 
 @dataclass(frozen=True)
@@ -117,7 +91,5 @@ def accounts(summary: Mapping[str, Any]) -> list[Account]:
 
 def errors(summary: Mapping[str, Any]) -> list[Row]:
     """Balance errors, the largest first."""
-    rows = [
-        row(name, value, False) for name, value in flatten(summary).items() if name.endswith(BALANCE_ERRORS)
-    ]
+    rows = [row(name, value, False) for name, value in flatten(summary).items() if quantity(name).error]
     return sorted(rows, key=lambda r: -abs(r.value))

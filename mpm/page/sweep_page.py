@@ -16,17 +16,15 @@ from mpm.page.numbers import shown
 from mpm.page.run_page import run_html, run_page
 from mpm.page.write import render, write_page
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import quantity
+from mpm.report.quantities import FIRST, quantity
 from mpm.report.quantity import RATIO, Quantity
-from mpm.report.tables import ROUNDING
+from mpm.report.rounding import without_rounding
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
 
 NAME = "report.html"
 MOST_PAGES = 200
 """Pages of single runs that come with a sweep's: each takes a second or two and some megabytes."""
-FIRST = ("titration.", "utilisation.", "dose_ratio.", "cvd.", "film.")
-"""Numbers that are offered first."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +110,7 @@ def sweep_page(directory: str | Path, say: Callable[[str], None] = lambda text: 
     numbers = [name for name in about["columns"] if name not in {axis.name for axis in axes}]
     columns = [_column(name, [row.get(name, "") for row in rows], steady) for name in numbers]
     varied = [
-        column
-        for column in columns
-        if (len(rows) == 1 or column.varies) and not column.name.endswith("balance_error")
+        column for column in columns if (len(rows) == 1 or column.varies) and not quantity(column.name).error
     ]
     return SweepPage(
         title=about.get("title") or root.resolve().name,
@@ -166,7 +162,7 @@ def _column(name: str, cells: Sequence[str], steady: bool) -> Column:
 
 def _clean(value: float, what: Quantity) -> float:
     """Of shares and coverages what is rounding beside 1 is 0, in the charts too."""
-    return 0.0 if what.unit == RATIO and abs(value) < ROUNDING else value
+    return without_rounding(value, 1.0 if what.unit == RATIO else 0.0)
 
 
 def _is_number(cell: str) -> bool:
@@ -177,7 +173,8 @@ def _is_number(cell: str) -> bool:
 
 
 def _place(column: Column) -> int:
-    return next((i for i, start in enumerate(FIRST) if column.name.startswith(start)), len(FIRST))
+    section = column.name.partition(".")[0]
+    return FIRST.index(section) if section in FIRST else len(FIRST)
 
 
 def _points(root: Path, rows: Sequence[dict[str, str]], say: Callable[[str], None]) -> list[Point]:

@@ -37,7 +37,7 @@ BELOW = 1e-6
 def history_figure(run: Run) -> Figure:
     """A panel for each inlet that doses, with the coverage its half-reaction makes; below them every balance error."""
     panels = titrations(run)
-    balances = {words: np.abs(values) for words, values in balance_errors(run).items()}
+    balances = {words: np.abs(values) for words, values in balance_curves(run).items()}
     drawn = {words: values for words, values in balances.items() if np.any(values > 0.0)}
     columns = min(2, max(1, len(panels)))
     lines = -(-len(panels) // columns)
@@ -92,7 +92,7 @@ def titrations(run: Run) -> list[tuple[str, dict[str, Floats]]]:
     return found
 
 
-def balance_errors(run: Run) -> dict[str, Floats]:
+def balance_curves(run: Run) -> dict[str, Floats]:
     """Balance errors in the history by what they are of, in words."""
     found = {}
     for key, values in run.history.items():
@@ -105,7 +105,7 @@ def balance_errors(run: Run) -> dict[str, Floats]:
 
 def has_history(run: Run) -> bool:
     """Whether there is a curve to draw: a coverage, or a balance error that is not zero."""
-    return bool(titrations(run)) or any(np.any(values != 0.0) for values in balance_errors(run).values())
+    return bool(titrations(run)) or any(np.any(values != 0.0) for values in balance_curves(run).values())
 
 
 def outlets_figure(run: Run) -> Figure:

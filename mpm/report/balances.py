@@ -15,6 +15,8 @@ from mpm.report.records import Totals, running_gas, running_surface
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
+TERMS = ("fed", "produced", "reacted", "left", "stored")
+"""Of a species' balance: fed + produced = reacted + left + stored."""
 FLOOR = 1e-6  # of the run's largest feed: balances of smaller amounts are measured against this
 LIMIT = 1e-6
 """Relative to the largest term of a balance: solvers leave 1e-9 and less, so more than this is a fault, not their tolerance."""

@@ -26,7 +26,7 @@ def row_of(records: Records) -> dict[str, float]:
     for section in SECTIONS:
         if section.history:
             tree |= _placed(section, section.gives(records))
-    return {name: value for name, value in numbers(tree) if not quantity(name).listed}
+    return {name: value for name, value in numbers(tree) if not quantity(name).profile}
 
 
 def _placed(section: Section, numbers: Mapping[str, Any]) -> dict[str, Any]:

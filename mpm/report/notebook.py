@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.markup import paragraph, table
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import quantity
-from mpm.report.tables import shown
+from mpm.report.quantities import FIRST, quantity, worst_balance_error
+from mpm.report.rounding import shown
 from mpm.report.trees import flatten
 from mpm.report.verdict import verdict
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-
-FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film")
-"""Sections of a summary that people look at first."""
 
 
 def result_html(case: Case, summary: Mapping[str, Any], where: str) -> str:
@@ -34,10 +31,11 @@ def result_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows = [
         (quantity(name, steady).label, superscript(shown(name, numbers, steady)))
         for name in chosen
-        if ".exit_profile." not in name
+        if not quantity(name).profile
     ]
-    errors = {name: value for name, value in numbers.items() if name.endswith("balance_error")}
-    if errors:
-        worst = max(errors, key=lambda name: abs(errors[name]))
-        rows.append(("largest relative error of a balance", f"{errors[worst]:.1e} ({quantity(worst).label})"))
+    worst = worst_balance_error(numbers)
+    if worst is not None:
+        rows.append(
+            ("largest relative error of a balance", f"{numbers[worst]:.1e} ({quantity(worst).label})")
+        )
     return rows

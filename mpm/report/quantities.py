@@ -23,17 +23,17 @@ _AMOUNT = "mol/m"
 _DEPTH = "per metre of depth of the reactor (the model is plane)"
 _DOSED = "What was dosed, what was used"
 _ASTRAY = "Parasitic growth and precursor astray"
-HEADINGS = (
-    *("What leaves coated", _DOSED, _ASTRAY, "Film", "Gas flow", "Gas in the outlets", "Fronts"),
-    "Time and cost",
-)
+COST = "Time and cost"
+HEADINGS = ("What leaves coated", _DOSED, _ASTRAY, "Film", "Gas flow", "Gas in the outlets", "Fronts", COST)
 """Of the sections, in the order in which people ask."""
+FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film")
+"""Sections that are offered before all others, or alone, where there is little room."""
 
 SECTIONS = (
     Section("", "", lambda r: {"time": r.time}, (
         Quantity("time", "time", "s", "simulated time since the start"),
     ), summary=False),
-    Section("", "Time and cost", run_itself, (
+    Section("", COST, run_itself, (
         Quantity("cells", "cells", "", "cells of the mesh"),
         Quantity("ranks", "processes", "", "MPI ranks that shared the mesh"),
         Quantity("steps", "steps", "", "time steps; in a steady run Newton steps"),
@@ -72,7 +72,7 @@ SECTIONS = (
         Quantity("titration.<inlet>.exit_min", "coverage where solids leave the zone of {inlet}, worst row", RATIO,
             "the same in the row of the bed that is coated least"),
         Quantity("titration.<inlet>.exit_profile.<row>", "coverage where solids leave the zone of {inlet}, row {row} from below", RATIO,
-            "share of the sites that this inlet's half-reaction has made, in one row of the last column of its zone", listed=True),
+            "share of the sites that this inlet's half-reaction has made, in one row of the last column of its zone", profile=True),
         Quantity("titration.<inlet>.box_mean", "coverage in the bed before {inlet}, mean", RATIO,
             "share of the sites that this inlet's half-reaction has made, mean over the bed from the entry of its zone to its centreline"),
     )),
@@ -128,9 +128,9 @@ SECTIONS = (
             f"volume flow {_DEPTH}, less what the outlet draws back in", "cm^2/s"),
         Quantity("flow.mass_error", "mismatch of inflow and outflow", RATIO, "difference of the two over the inflow", error=True),
         Quantity("flow.bed_superficial_velocity.0", "superficial gas velocity in the bed, along", "m/s",
-            "mean over the moving layer and the cycle, relative to the reactor", "cm/s", listed=True),
+            "mean over the moving layer and the cycle, relative to the reactor", "cm/s"),
         Quantity("flow.bed_superficial_velocity.1", "superficial gas velocity in the bed, upwards", "m/s",
-            "mean over the moving layer and the cycle, relative to the reactor", "cm/s", listed=True),
+            "mean over the moving layer and the cycle, relative to the reactor", "cm/s"),
         Quantity("flow.bed_pressure_drop", "pressure drop of the bed", "Pa",
             "between the lower and the upper face of the moving layer", again=True),
         Quantity("flow.frit_pressure_drop", "pressure drop of the frit", "Pa",
@@ -143,14 +143,39 @@ QUANTITIES = tuple(number for section in SECTIONS for number in section.numbers)
 
 
 def headed(names: Iterable[str]) -> list[tuple[str, list[str]]]:
-    """Dotted names under the headings of their sections, in the order of `HEADINGS`, without headings that have none."""
-    heading_of = {number.name: section.heading for section in SECTIONS for number in section.numbers}
+    """Dotted names of a summary under the headings of their sections, in the order of `HEADINGS`; headings that have none are left out.
+
+    Without profiles and balance errors, and without what another of the names says again.
+    """
     found: dict[str, list[str]] = {heading: [] for heading in HEADINGS}
+    names = list(names)
+    by_layer = any(name.startswith("flow.pressure_drop.") for name in names)
     for name in names:
-        entry = _entry(name)
-        if entry is not None and heading_of[entry[0].name]:
-            found[heading_of[entry[0].name]].append(name)
+        number, section = quantity(name), _section_of(name)
+        told = number.profile or number.error or (number.again and by_layer)
+        if section is not None and section.heading and not told:
+            found[section.heading].append(name)
     return [(heading, inside) for heading, inside in found.items() if inside]
+
+
+def _section_of(name: str) -> Section | None:
+    found = entry(name)
+    return next((section for section in SECTIONS if found in section.numbers), None)
+
+
+def files_of(name: str) -> list[str]:
+    """The files of a run that hold the number of this dotted name."""
+    section = _section_of(name)
+    if section is None:
+        return []
+    held = {"history.csv": section.history and not quantity(name).profile, "summary.json": section.summary}
+    return [file for file, holds in held.items() if holds]
+
+
+def worst_balance_error(numbers: Mapping[str, float]) -> str | None:
+    """Name of the largest relative error of a balance among the numbers of a summary."""
+    errors = [name for name in numbers if quantity(name).error]
+    return max(errors, key=lambda name: abs(numbers[name]), default=None)
 
 
 @cache
@@ -163,7 +188,7 @@ def _patterns() -> tuple[tuple[re.Pattern[str], Quantity], ...]:
 
 
 @lru_cache(maxsize=4096)
-def _entry(name: str) -> tuple[Quantity, Mapping[str, str]] | None:
+def _match(name: str) -> tuple[Quantity, Mapping[str, str]] | None:
     """The entry for a dotted name, and what the case has put for its <part>s."""
     for pattern, found in _patterns():
         if match := pattern.fullmatch(name):
@@ -176,10 +201,10 @@ def quantity(name: str, steady: bool = False) -> Quantity:
 
     A name that is not in the table is a pure number whose label is the name itself.
     """
-    entry = _entry(name)
-    if entry is None:
+    match = _match(name)
+    if match is None:
         return Quantity(name, name, RATIO, "")
-    found, parts = entry
+    found, parts = match
     per = "/s" if steady and found.rate else ""
     return replace(
         found,
@@ -191,9 +216,15 @@ def quantity(name: str, steady: bool = False) -> Quantity:
     )
 
 
+def entry(name: str) -> Quantity | None:
+    """The entry for a dotted name as it stands in the table, or None."""
+    found = _match(name)
+    return None if found is None else found[0]
+
+
 def known(name: str) -> bool:
     """Whether the table has an entry for this dotted name."""
-    return _entry(name) is not None
+    return _match(name) is not None
 
 
 def unit_of(name: str, steady: bool = False) -> str:

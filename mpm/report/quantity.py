@@ -20,8 +20,8 @@ class Quantity:
     """One kind of number. `name` is a dotted name in which <part> stands for a name of the case; `label` and `meaning` may use the {part}s.
 
     `unit` is SI (RATIO: a pure number, "": a count); `shown` the unit people read it in. `rate`: in a steady state per second. `error`: how
-    far a balance is from closing. `again`: another number says the same (names kept for scripts). `listed`: an entry of a list, which
-    history.csv leaves out.
+    far a balance is from closing. `again`: another number says the same (names kept for scripts). `profile`: an entry of a list, which
+    history.csv, and screens, leave out.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Quantity:
     rate: bool = False
     error: bool = False
     again: bool = False
-    listed: bool = False
+    profile: bool = False
 
     @property
     def factor(self) -> float:
