@@ -69,7 +69,7 @@ def test_poiseuille() -> None:
     errors, cells = [], [8, 16, 32]
     for n in cells:
         p = problem(layered(n, 0, height, 0.0, mu=mu, rho=0.7))
-        steady_flow(p, StepMotion(0.0, -force / 0.7, 0.0, 0.0))
+        steady_flow(p, StepMotion(acceleration=-force / 0.7))
         y = centres(p)
         exact = force * y * (height - y) / (2 * mu)
         errors.append(norm(profile(p) - exact) / exact.max())
@@ -143,7 +143,7 @@ def test_gas_over_a_porous_layer(name: str) -> None:
             viscosity_ratio=ratio,
         ).with_({"geometry.layer.gas.grading": 1 / grading, "geometry.layer.bed.grading": grading})
         p = problem(case)
-        steady_flow(p, StepMotion(drag, -force, 0.0, 0.0))
+        steady_flow(p, StepMotion(bed_velocity=drag, acceleration=-force))
         y, weights = centres(p), p.strip.grid.dy
         exact = brinkman(1.0, ratio, k, 0.5, 1.0, force, drag)(y)
         errors.append(norm(volume_flux(p, drag) - exact, weights) / np.abs(exact).max())
@@ -160,7 +160,7 @@ def test_bed_of_the_thesis_drags_the_gas_above_it() -> None:
     v_s, eps = 0.013, 0.46
     case = layered(20, 6, 1e-2, 3e-3, mu=1.72e-5, rho=0.7217, porosity=eps, permeability="4.25 um^2")
     p = problem(case)
-    steady_flow(p, StepMotion(v_s, 0.0, 0.0, 0.0))
+    steady_flow(p, StepMotion(bed_velocity=v_s))
     u, y = profile(p), centres(p)
     np.testing.assert_allclose(u[1:5], eps * v_s, rtol=1e-4)
     table = np.interp(y[6:], np.linspace(0, 1e-2, 11), [1.299732053e-02 * (1 - i / 10) for i in range(11)])
@@ -199,7 +199,7 @@ def test_a_strip_in_which_everything_moves_equals_one_at_rest() -> None:
     for layer in case.geometry.layers:  # a case has one moving layer at most; the equations do not mind
         object.__setattr__(layer, "moving", layer.material_name is not None)
     p = problem(case, comm=COMM)
-    fields = [steady_flow(p, StepMotion(v, -0.05, 0.0, 0.0)) for v in (0.0, speed)]
+    fields = [steady_flow(p, StepMotion(bed_velocity=v, acceleration=-0.05)) for v in (0.0, speed)]
     rest, moving = (f.velocities[:, : p.strip.owned] for f in fields)
     solids = np.array([porosities.get(l.material_name or "", 1.0) for l in case.geometry.layers])
     gained = speed * solids[p.strip.grid.row_layer][p.strip.row[: p.strip.owned]]
@@ -348,7 +348,7 @@ def oscillate(
 
     last: list[np.ndarray] = []
     for n in range(cycles * steps):
-        p.step(StepMotion(mean(drag, n), mean(acceleration, n), 0.0, 0.0))
+        p.step(StepMotion(bed_velocity=mean(drag, n), acceleration=mean(acceleration, n)))
         if n >= (cycles - 1) * steps:
             last.append(profile(p))
     return last
@@ -421,7 +421,7 @@ def test_flow_does_not_see_the_seam() -> None:
             TINY,
         )
         p = problem(case, comm=COMM)
-        field = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
+        field = steady_flow(p, StepMotion(bed_velocity=0.013))
         return p.strip.scatter.to_all(field.velocities[:, : p.strip.owned]).reshape(
             4, p.strip.grid.rows, columns
         )
@@ -498,7 +498,7 @@ def test_steady_flow_is_a_fixed_point_of_the_time_steps() -> None:
     """Fails when Newton's steady state is not that of the marched equations, convection included (Re about 70 in the port)."""
     case = zone({"geometry.inlet.tma.velocity": "40 cm/s", "geometry.inlet.purge.velocity": "40 cm/s"}, TINY)
     p = problem(case, 1e-3)
-    motion = StepMotion(0.013, 0.0, 0.0, 0.0)
+    motion = StepMotion(bed_velocity=0.013)
     before = steady_flow(p, motion).velocities.copy()
     for _ in range(3):
         p.step(motion)
@@ -545,7 +545,7 @@ def test_gas_seeps_through_a_bed_of_fine_powder(permeability: float) -> None:
         {"material.glass_beads.permeability": f"{permeability!r} m^2", "gas.viscosity": "1.72e-5 Pa s"}, TINY
     )
     p = problem(case)
-    mean = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
+    mean = steady_flow(p, StepMotion(bed_velocity=0.013))
     seeping = 2.0 * 0.035 * 4e-3 / 139.7e-3
     drops = pressure_drops(case, p.strip, mean)
     assert drops["bed"] == pytest.approx(1.72e-5 * seeping * 3e-3 / permeability, rel=1e-6)
@@ -574,7 +574,7 @@ def test_pressure_drops_are_between_the_faces_of_a_layer(frit: str, frit_cells: 
     }
     case = zone(changes)
     p = problem(case, comm=COMM)
-    mean = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
+    mean = steady_flow(p, StepMotion(bed_velocity=0.013))
     numbers = flow_numbers(case, p.strip, mean)
     seeping = 2.0 * 0.035 * 4e-3 / 139.7e-3
     assert numbers["bed_pressure_drop"] == pytest.approx(1.72e-5 * seeping * 3e-3 / 4.25e-12, rel=1e-4)
@@ -597,7 +597,7 @@ def test_flow_of_each_outlet_and_flux_through_the_frit() -> None:
     data["geometry"]["outlet"] = outlets
     case = load_case(data)
     p = problem(case, comm=COMM)
-    mean = steady_flow(p, StepMotion(0.013, 0.0, 0.0, 0.0))
+    mean = steady_flow(p, StepMotion(bed_velocity=0.013))
     numbers, flux = flow_numbers(case, p.strip, mean), flux_profiles(p.strip, mean)
     assert set(numbers["outlets"]) == {"near", "far"} and min(numbers["outlets"].values()) > 0.0
     assert sum(numbers["outlets"].values()) == pytest.approx(numbers["inflow"], rel=1e-10)

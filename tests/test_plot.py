@@ -25,7 +25,6 @@ from mpm.pictures.curves import exit_profile_figure, history_figure, outlets_fig
 from mpm.pictures.maps import PLAIN, map_figure
 from mpm.pictures.outline import WIDTH, formula, spread
 from mpm.pictures.standard import Fields, draw_field, figures, plot_run
-from mpm.report.dosing import dosing_inlets, fed_species, sites_made_by
 
 SITE = "OAl(CH3)2"
 COVERAGE = f"theta_{SITE}"
@@ -52,14 +51,14 @@ def write_run(path: Path, case: Case, times: np.ndarray = TIMES) -> Run:
     x, y = centres(grid)
     for t in times:
         data: dict[str, np.ndarray] = {f"theta_{SITE}": theta(grid, t), "theta_OH": 1.0 - theta(grid, t)}
-        data |= {f"x_{name}": np.exp(-x / 0.01) * 1e-4 for name in fed_species(case)}
+        data |= {f"x_{name}": np.exp(-x / 0.01) * 1e-4 for name in case.fed_species}
         data["cvd_rate"] = 1e-3 * np.exp(-((y / 1e-3) ** 2))
         data["pressure"] = 45.0 + 0.0 * y
         gas = {"velocity": np.full((grid.cells, 2), (-0.03, 0.0))}
         stored = {name: values.ravel() for name, values in data.items()}
         directory.write_fields(float(t), grid, {**stored, **gas})
         row: dict[str, float | None] = {"time": float(t), "balance.TMA": -1e-13 * t, "balance.sites": 0.0}
-        for number, inlet in enumerate(dosing_inlets(case)):
+        for number, inlet in enumerate(case.dosing_inlets):
             row |= {f"titration.{inlet.name}.box_mean": t / (4 + number)}
             row |= {f"titration.{inlet.name}.exit_mean": t / 2}
         for number, outlet in enumerate(case.geometry.outlets):
@@ -235,7 +234,7 @@ def by_label(figure: Figure, panel: int) -> dict[str, np.ndarray]:
 def test_history_curves(cycle: Run) -> None:
     """Fails when a curve is missing, is another column's, or a balance error loses its magnitude."""
     figure = history_figure(cycle)
-    for panel, inlet in enumerate(dosing_inlets(cycle.case)):
+    for panel, inlet in enumerate(cycle.case.dosing_inlets):
         curves = by_label(figure, panel)
         assert np.array_equal(curves.pop("in the bed before the inlet, mean"), TIMES / (4 + panel))
         assert np.array_equal(curves.pop("where solids leave the zone, mean"), TIMES / 2)
@@ -291,8 +290,8 @@ def test_exit_profile_is_the_last_column_of_the_zone(cycle: Run) -> None:
     grid = cycle.grid
     rows = grid.layer_rows("bed")
     y = 0.5 * (grid.y[1:] + grid.y[:-1])[rows] * 1e3
-    inlets = dosing_inlets(cycle.case)
-    assert [sites_made_by(cycle.case, inlet) for inlet in inlets] == [(SITE,), ("OH",)]
+    inlets = cycle.case.dosing_inlets
+    assert [cycle.case.sites_made_by(inlet) for inlet in inlets] == [(SITE,), ("OH",)]
     for panel, column in ((0, grid.columns // 2 - 1), (1, grid.columns - 1)):
         last = figure.axes[panel].get_lines()[-1]
         expected = theta(grid, 2.0)[rows, column]

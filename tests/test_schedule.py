@@ -59,9 +59,9 @@ def test_output_at_the_first_step_that_reaches_a_multiple() -> None:
 def test_steps_fit_the_shifts_of_the_bed() -> None:
     """Fails when columns stay for a different number of steps: 5 mm at 1.3 cm/s take 0.385 s."""
     shift = 5e-3 / 0.013
-    assert aligned_step(0.014, 5e-3, 0.013) == pytest.approx(shift / 28)
-    assert aligned_step(1.0, 5e-3, 0.013) == pytest.approx(2 * shift)
-    assert aligned_step(0.014, 5e-3, 0.0) == 0.014
+    assert aligned_step(0.014, column=5e-3, speed=0.013) == pytest.approx(shift / 28)
+    assert aligned_step(1.0, column=5e-3, speed=0.013) == pytest.approx(2 * shift)
+    assert aligned_step(0.014, column=5e-3, speed=0.0) == 0.014
 
 
 def test_a_strip_without_a_bed_does_not_align_its_steps() -> None:

@@ -115,7 +115,7 @@ def feed_caveats(case: Case) -> list[str]:
     """Inlets whose engineering numbers are of one of several precursors."""
     found = []
     for inlet in case.geometry.inlets:
-        fed = case.mechanism.precursors(inlet.mass_fractions)
+        fed = case.precursors(inlet)
         if len(fed) > 1:
             found.append(
                 f"inlet {inlet.name} feeds several precursors, {', '.join(fed)}: its excess number, titration, utilisation and front are "
@@ -131,7 +131,7 @@ def steady_caveats(case: Case) -> list[str]:
     return [
         f"inlet {inlet.name} stops dosing at {inlet.windows[-1][1]:g} s: in the steady state it blows carrier gas alone"
         for inlet in case.geometry.inlets
-        if any(inlet.mass_fractions.values()) and not inlet.stays_open
+        if inlet.feed and not inlet.stays_open
     ]
 
 

@@ -17,9 +17,10 @@ from mpm.advice.idle import idle_keys
 from mpm.advice.limits import beyond_limits
 from mpm.advice.notes import notes
 from mpm.case.case import Case
-from mpm.case.geometry import Inlet, Layer
 from mpm.case.keys import values
+from mpm.case.layers import Layer
 from mpm.case.materials import Material
+from mpm.case.ports import Inlet
 from mpm.mesh.grid import Grid
 from mpm.motion.kinematics import Vibration
 from mpm.motion.schedule import Schedule
@@ -185,8 +186,7 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
 
 
 def _bed(case: Case, layer: Layer) -> dict[str, Any]:
-    gas, material, geometry = case.gas, layer.material, case.geometry
-    assert material is not None
+    gas, material, geometry = case.gas, layer.solid, case.geometry
     rising = max(
         (eng.rising_velocity(case, i.center) for i in geometry.inlets if i.side == "bottom"), default=0.0
     )

@@ -11,7 +11,7 @@ from mpm.report.dosing import inlet_excess
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-    from mpm.case.geometry import Inlet
+    from mpm.case.ports import Inlet
 
 VERB = "optimise"
 """What a message begins with."""
@@ -91,7 +91,7 @@ def checked_doses(case: Case, target: float, weight: float, velocities: bool, li
 def refuse_inlet(case: Case, inlet: Inlet) -> None:
     """Raise InputError for a dosing inlet whose dose the search could not choose or whose effect it could not see."""
     key = f"geometry.inlet.{inlet.name}"
-    fed = case.mechanism.precursors(inlet.mass_fractions)
+    fed = case.precursors(inlet)
     if inlet.velocity == 0.0:
         raise InputError.at(
             VERB, f"{key}.velocity", "0 m/s, a port that doses nothing", "a velocity above 0 m/s"

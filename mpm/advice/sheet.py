@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from mpm.case.case import Case
-from mpm.case.geometry import Inlet
 from mpm.case.marks import Marked, value_text
+from mpm.case.ports import Inlet
 from mpm.screen import Listing, Sheet, number, together
 
 

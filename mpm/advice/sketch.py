@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mpm.case.geometry import Inlet, Layer, Outlet
+from mpm.case.layers import Layer
+from mpm.case.ports import Inlet, Outlet
 from mpm.screen import lines_of, together
 
 if TYPE_CHECKING:

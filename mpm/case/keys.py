@@ -146,10 +146,10 @@ def text_of(key: Key, value: Any) -> str:
 
 def _sources(case: Case) -> tuple[Any, Mapping[str, Any], Any, Any]:
     """What a case is put together from: the file's own tables, dotted overrides, the shared geometry, built-in materials and mechanism."""
-    data, overrides, folder, label = case._origin
-    mechanism = mechanism_tables(data, overrides, folder, label)
-    base = {"geometry": shared_geometry(data, overrides, folder, label)}
-    return data, overrides, base, {"material": BUILT_IN, "chemistry": mechanism}
+    of = case.origin
+    mechanism = mechanism_tables(of.data, of.overrides, of.folder, of.label)
+    base = {"geometry": shared_geometry(of.data, of.overrides, of.folder, of.label)}
+    return of.data, of.overrides, base, {"material": BUILT_IN, "chemistry": mechanism}
 
 
 def _set_by(dotted: str, value: Any, path: Address) -> bool:

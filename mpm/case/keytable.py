@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from mpm.case.materials import BUILT_IN
 from mpm.case.schema import finished, number_text
 from mpm.case.sources import built_in_files
+from mpm.case.tables import CaseTables
 
 ENTRIES = {
     "mass_fractions": "species",
@@ -137,9 +138,7 @@ class Key:
 @cache
 def all_keys() -> tuple[Key, ...]:
     """Every key and table of a case file, in the order of a file."""
-    from mpm.case.case import Case
-
-    return tuple(_keys_of_model(Case, ""))
+    return tuple(_keys_of_model(CaseTables, ""))
 
 
 def keys_of(table: str) -> list[Key]:

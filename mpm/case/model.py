@@ -1,10 +1,12 @@
-"""The base of the tables of input files as pydantic classes, and what their JSON Schemas do not demand."""
+"""What the tables of input files have in common: their base as pydantic classes, names, flags, and what their schemas do not demand."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Strict
+
+from mpm.units import reject
 
 
 class Frozen(BaseModel):
@@ -21,3 +23,14 @@ def nothing_required(schema: dict[str, Any]) -> None:
 def only_name_required(schema: dict[str, Any]) -> None:
     """Schema of an entry of a list that may complete one of a shared geometry: there it need only say which."""
     schema["required"] = ["name"]
+
+
+def _name(value: str) -> str:
+    if not value or not all(character.isalnum() or character in "_-" for character in value):
+        raise reject(repr(value), "a name of letters, digits, _ and -")
+    return value
+
+
+Name = Annotated[str, AfterValidator(_name)]
+"""What an entry is called in results and keys."""
+Flag = Annotated[bool, Strict()]

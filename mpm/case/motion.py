@@ -13,7 +13,7 @@ from pydantic import Field, PrivateAttr, SerializerFunctionWrapHandler, model_se
 
 from mpm.case.model import Frozen
 from mpm.case.profile import PRESETS, BedProfile, read_profile
-from mpm.constants import GRAVITY
+from mpm.constants import GRAVITY, TURN
 from mpm.units import Angle, BedSpeed, Frequency, Instant, NonNegative, Velocity, reject
 
 SAME_FREQUENCY = 0.01
@@ -49,22 +49,34 @@ class Motion(Frozen):
     startup: Literal["developed", "impulsive"] = "developed"
     """how a resolved run begins to vibrate: in the periodic state of the gas, or from rest with the true transient"""
 
-    _table: BedProfile | None = PrivateAttr(None)
+    _file: BedProfile | None = PrivateAttr(None)
 
     @property
     def table(self) -> BedProfile | None:
-        """The profile file's content; None without vibration or with a profile of phases."""
-        return self._table
+        """The profile file's content; None without vibration, or without such a file."""
+        return self._file if self.gamma > 0.0 else None
+
+    @property
+    def phases(self) -> tuple[float, float] | None:
+        """Phases of lift-off and contact [rad] where the case gives them (profile phases)."""
+        if self.profile != "phases" or self.liftoff_phase is None or self.contact_phase is None:
+            return None
+        return self.liftoff_phase, self.contact_phase
+
+    @property
+    def profile_content(self) -> str:
+        """The text of the profile file, by which cases are told apart, else the name of the preset."""
+        return self.profile if self._file is None else self._file.text
 
     @property
     def mean_velocity(self) -> float:
         """Cycle mean of the bed's velocity in the reactor's frame [m/s], negative to the left: the profile file's, else `bed_velocity`."""
-        return self.bed_velocity if self._table is None else self._table.mean
+        return self.bed_velocity if self.table is None else self.table.mean
 
     @property
     def peak_vertical_velocity(self) -> float:
         """Amplitude of the reactor's vertical velocity, Gamma g / w [m/s]."""
-        return self.gamma * GRAVITY / (2.0 * math.pi * self.frequency)
+        return self.gamma * GRAVITY / (TURN * self.frequency)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -77,7 +89,7 @@ class Motion(Frozen):
                 key="angle",
             )
         if self.profile not in PRESETS:
-            self._read_table()
+            self._file = self._read_file()
         elif self.gamma == 0.0:
             pass  # nothing hops: a preset has no phases to check
         elif self.profile == "thesis":
@@ -91,7 +103,7 @@ class Motion(Frozen):
         else:
             for key in ("liftoff_phase", "contact_phase"):
                 value = getattr(self, key)
-                if value is None or not 0.0 <= value < 2.0 * math.pi:
+                if value is None or not 0.0 <= value < TURN:
                     raise reject(
                         "nothing" if value is None else f"{math.degrees(value):g} deg",
                         'an angle from 0 deg to below 360 deg, e.g. "97.85 deg", for profile = "phases"',
@@ -101,25 +113,27 @@ class Motion(Frozen):
                 raise reject("the phase of lift-off", "another phase", key="contact_phase")
         return self
 
-    def _read_table(self) -> None:
+    def _read_file(self) -> BedProfile:
         """Read the profile file; it must be one even where nothing vibrates, and of this frequency where something does."""
-        table = read_profile(Path(self.profile), "profile")
-        if self.gamma == 0.0:
-            return
-        made = table.conditions
-        if made is not None and abs(made.frequency - self.frequency) > SAME_FREQUENCY * self.frequency:
+        profile = read_profile(Path(self.profile))
+        made = profile.conditions
+        if (
+            self.gamma > 0.0
+            and made is not None
+            and abs(made.frequency - self.frequency) > SAME_FREQUENCY * self.frequency
+        ):
             raise reject(
                 f"{self.profile}: a profile made at {made.frequency:.6g} Hz for a vibration at {self.frequency:.6g} Hz, in whose cycle its "
                 "bed would hop to another beat",
                 f'a profile made at {self.frequency:.6g} Hz, or frequency = "{made.frequency:.6g} Hz"',
                 key="profile",
             )
-        self._table = table
+        return profile
 
     @model_serializer(mode="wrap")
     def _write_what_rules(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Without `bed_velocity` where a profile file says how fast the bed moves."""
         table: dict[str, Any] = handler(self)
-        if self._table is not None:
+        if self.table is not None:
             table.pop("bed_velocity", None)
         return table

@@ -8,15 +8,15 @@ from mpm.markup import paragraph, table
 from mpm.screen import number
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case
+    from mpm.case.tables import CaseTables
 
 
-def case_html(case: Case) -> str:
+def case_html(case: CaseTables) -> str:
     """Title and key numbers of a case."""
     return paragraph(case.title or "case", bold=True) + table(case_rows(case))
 
 
-def case_rows(case: Case) -> list[tuple[str, str]]:
+def case_rows(case: CaseTables) -> list[tuple[str, str]]:
     """What one asks first of a case, each value with its unit."""
     geometry, motion = case.geometry, case.motion
     height = sum(layer.height for layer in geometry.layers)
@@ -35,9 +35,7 @@ def case_rows(case: Case) -> list[tuple[str, str]]:
             )
         )
     for inlet in geometry.inlets:
-        fed = ", ".join(
-            f"mass fraction {number(x)} of {name}" for name, x in inlet.mass_fractions.items() if x
-        )
+        fed = ", ".join(f"mass fraction {number(x)} of {name}" for name, x in inlet.feed.items())
         rows.append(
             (
                 f"inlet {inlet.name}",

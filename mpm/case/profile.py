@@ -24,6 +24,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from mpm.case.model import Frozen
+from mpm.constants import TURN
 from mpm.files import read_text
 from mpm.units import Angle, Frequency, NonNegative, reject
 
@@ -31,7 +32,6 @@ PRESETS = ("thesis", "phases")
 """What `motion.profile` may be besides the path of a file."""
 REQUIRED = ("phase_deg", "u_x_m/s")
 COLUMNS = (*REQUIRED, "u_y_m/s", "contact")
-TURN = 2.0 * math.pi
 
 
 class Conditions(Frozen):
@@ -54,12 +54,13 @@ class Conditions(Frozen):
 class BedProfile:
     """Velocity u_x [m/s] of the bed in the lab's frame over one cycle, linear between phases [rad] that rise from 0 to 2 pi.
 
-    The last point repeats the first one turn later. `conditions`: the vibration it was made under, if the file says so.
+    The last point repeats the first one turn later. `conditions`: the vibration it was made under, if the file says so. `text`: the file.
     """
 
     phase: tuple[float, ...]
     velocity: tuple[float, ...]
-    conditions: Conditions | None = None
+    conditions: Conditions | None
+    text: str
 
     @property
     def mean(self) -> float:
@@ -68,11 +69,11 @@ class BedProfile:
         return float((0.5 * np.diff(phase) * (u[1:] + u[:-1])).sum() / TURN)
 
 
-def read_profile(path: Path, key: str = "profile") -> BedProfile:
-    """Read and check a profile; raises the validator error for `key` that says what is wrong with the file."""
+def read_profile(path: Path) -> BedProfile:
+    """Read and check a profile; raises the validator error for the key `profile` that says what is wrong with the file."""
 
     def wrong(found: str, accepted: str, **context: object) -> Exception:
-        return reject(f"{path}: {found}", accepted, key=key, **context)
+        return reject(f"{path}: {found}", accepted, key="profile", **context)
 
     try:
         text = read_text(path)
@@ -105,20 +106,21 @@ def read_profile(path: Path, key: str = "profile") -> BedProfile:
     rising = all(a < b for a, b in pairwise(phases))
     if not rising or phases[0] < 0.0 or phases[-1] > 360.0:
         raise wrong("phases that do not rise from 0 to 360", "phase_deg that rises within 0 to 360 deg")
-    return _closed(phases, velocities, _conditions([line for line in lines if line[0] == "#"], wrong))
+    conditions = _conditions([line for line in lines if line[0] == "#"], wrong)
+    return BedProfile(*_closed(phases, velocities), conditions, text)
 
 
 def _closed(
-    phases: Sequence[float], velocities: Sequence[float], conditions: Conditions | None
-) -> BedProfile:
-    """The table from 0 to 2 pi, so that linear interpolation closes the cycle."""
+    phases: Sequence[float], velocities: Sequence[float]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Phases [deg] as [rad] from 0 to 2 pi with their velocities, so that linear interpolation closes the cycle."""
     phase, velocity = np.radians(phases), np.array(velocities)
     inside = phase < TURN * (1.0 - 1e-12)
     phase, velocity = phase[inside], velocity[inside]
     at_zero = float(np.interp(0.0, [phase[-1] - TURN, phase[0]], [velocity[-1], velocity[0]]))
     if phase[0] > 0.0:
         phase, velocity = np.insert(phase, 0, 0.0), np.insert(velocity, 0, at_zero)
-    return BedProfile((*phase.tolist(), TURN), (*velocity.tolist(), float(velocity[0])), conditions)
+    return (*phase.tolist(), TURN), (*velocity.tolist(), float(velocity[0]))
 
 
 def _conditions(comments: Sequence[str], wrong: Callable[..., Exception]) -> Conditions | None:

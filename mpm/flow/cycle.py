@@ -32,7 +32,7 @@ def cycle_motions(bed_motion: BedMotion, dt: float, phases: int) -> list[StepMot
 
 def mean_motion(bed_motion: BedMotion) -> StepMotion:
     """Forcing averaged over a cycle: the frame's means vanish, the bed's mean velocity remains."""
-    return StepMotion(bed_motion.mean, 0.0, 0.0, 0.0)
+    return StepMotion(bed_velocity=bed_motion.mean)
 
 
 def periodic_flow(
@@ -54,10 +54,9 @@ def periodic_flow(
     if phases == 1:
         return [problem.field()]
     mean = StepMotion(
-        float(np.mean([m.bed_velocity for m in motions])),
-        float(np.mean([m.acceleration for m in motions])),
-        float(np.mean([m.frame_velocity_y for m in motions])),
-        0.0,
+        bed_velocity=float(np.mean([m.bed_velocity for m in motions])),
+        acceleration=float(np.mean([m.acceleration for m in motions])),
+        frame_velocity_y=float(np.mean([m.frame_velocity_y for m in motions])),
     )
     # of the last cycle, as vectors; the next one takes their places, because two or their fields would be much to hold beside the factors
     states: list[Floats] = []

@@ -13,7 +13,8 @@ from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 from mpm.parallel import total
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Inlet
+    from mpm.case.case import Case
+    from mpm.case.ports import Inlet
     from mpm.mesh.grid import Grid
 
 Floats = NDArray[np.float64]

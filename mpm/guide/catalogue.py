@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpm.case.chemistry import Chemistry, build_mechanism
+from mpm.case.chemistry import Chemistry
 from mpm.case.kinds import RUN, kind_of_directory
 from mpm.case.materials import BUILT_IN, SITE_DENSITIES
 from mpm.case.names import POWDER_FILES, SWEEP_FILES
+from mpm.case.reactions import build_mechanism
 from mpm.case.schema import for_people, number_text
 from mpm.case.sources import built_in_files, read_toml, shared_geometry
 from mpm.errors import InputError

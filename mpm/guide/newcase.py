@@ -160,9 +160,9 @@ class _Writer:
 
 def _mechanism(case: Case, folder: Path) -> str:
     """The mechanism's name, or the path of its file from `folder`."""
-    data, _, origin, _ = case._origin
+    data, home = case.origin.data, case.origin.folder
     name = str(data.get("chemistry", {}).get("mechanism", case.chemistry.mechanism))
-    return os.path.relpath(origin / name, folder) if is_file(origin / name) else name
+    return os.path.relpath(home / name, folder) if is_file(home / name) else name
 
 
 def _header(active: bool, text: str) -> str:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Layer
+    from mpm.case.case import Case
+    from mpm.case.layers import Layer
     from mpm.case.materials import Material
 
 Floats = NDArray[np.float64]

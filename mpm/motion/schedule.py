@@ -14,7 +14,7 @@ RESTING = -1
 SLACK = 1e-9  # of a step or an output interval: times that agree to this are equal
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Step:
     """One time step from `t0` over `dt` to `t1` [s]; `phase` numbers it within its cycle, RESTING before the vibration starts.
 
@@ -37,7 +37,7 @@ class Step:
         return self.dt < self.whole
 
 
-def aligned_step(step: float, column: float, speed: float) -> float:
+def aligned_step(step: float, *, column: float, speed: float) -> float:
     """The longest step up to `step` [s] that fits the bed's shifts: a whole number of steps per column, or of columns per step.
 
     Every column then meets the gas of a cell for equally long, where otherwise some would stay a step longer than their neighbours.
@@ -51,7 +51,7 @@ def aligned_step(step: float, column: float, speed: float) -> float:
     return shift * floor(step / shift + SLACK)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Schedule:
     """Equal steps of `dt` [s] from the start of the vibration on, `phases` of them per cycle (1: every step is alike).
 
@@ -69,10 +69,12 @@ class Schedule:
         if case.fidelity == "resolved":
             n = case.time.steps_per_cycle
             phases = n if case.motion.gamma > 0.0 else 1
-            return cls(1.0 / case.motion.frequency / n, phases, case.motion.start, case.time.end)
-        column = case.geometry.length / case.geometry.columns
-        step = aligned_step(case.time.step, column, abs(case.conveying_velocity))
-        return cls(step, 1, case.motion.start, case.time.end)
+            return cls(
+                dt=1.0 / case.motion.frequency / n, phases=phases, start=case.motion.start, end=case.time.end
+            )
+        column = case.geometry.dx
+        step = aligned_step(case.time.step, column=column, speed=abs(case.conveying_velocity))
+        return cls(dt=step, phases=1, start=case.motion.start, end=case.time.end)
 
     @property
     def resting_steps(self) -> int:
@@ -99,9 +101,11 @@ class Schedule:
         rest = self.resting_steps
         if index < rest:
             dt = self.start / rest
-            return Step(index, index * dt, (index + 1) * dt, dt, dt, RESTING, index * dt - self.start)
-        k, dt = index - rest, self.dt
-        return Step(index, self.start + k * dt, self.start + (k + 1) * dt, dt, dt, k % self.phases, k * dt)
+            t0, t1, phase, since = index * dt, (index + 1) * dt, RESTING, index * dt - self.start
+        else:
+            k, dt = index - rest, self.dt
+            t0, t1, phase, since = self.start + k * dt, self.start + (k + 1) * dt, k % self.phases, k * dt
+        return Step(index=index, t0=t0, t1=t1, dt=dt, whole=dt, phase=phase, since=since)
 
     def from_step(self, index: int) -> Iterator[Step]:
         """All steps from `index` on."""

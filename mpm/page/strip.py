@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from mpm.case.case import Case, Inlet, Outlet
+from mpm.case.case import Case
+from mpm.case.ports import Inlet, Outlet
 from mpm.pictures.outline import OKABE_ITO, spread
-from mpm.report.dosing import fed_by
 
 WIDTH = 860.0
 """Length of the strip."""
@@ -142,7 +142,7 @@ def port_lines(case: Case, port: Inlet | Outlet) -> tuple[str, ...]:
     """Name, flow and dose of a port, a line each."""
     if isinstance(port, Outlet):
         return (port.name, "to ambient pressure")
-    fed = [f"{name} {port.mass_fractions[name]:.3g}" for name in fed_by(port, case.mechanism.species_names)]
+    fed = [f"{name} {port.mass_fractions[name]:.3g}" for name in case.fed_by(port)]
     lines = [port.name, f"{port.velocity * 100.0:.3g} cm/s {case.gas.carrier}"]
     if fed:
         lines[-1] += f" + {', '.join(fed)} (mass)"
@@ -168,7 +168,7 @@ def _ports(case: Case, per_metre: float) -> list[PortMark]:
             at = min(max(port.center * per_metre, half), WIDTH - half)
             line = next((i for i, right in enumerate(taken) if at - half > right + LETTER), len(taken))
             taken[line : line + 1] = [at + half]
-            fed = fed_by(port, species) if isinstance(port, Inlet) else []
+            fed = case.fed_by(port) if isinstance(port, Inlet) else ()
             colour = (
                 OKABE_ITO[species.index(fed[0]) % 6]
                 if fed

@@ -151,14 +151,6 @@ class Mechanism:
         """The surface reactions that consume `species`: together they are what an ALD half-cycle does."""
         return tuple(reaction for reaction in self.surface_reactions if reaction.gas == species)
 
-    def precursors(self, feed: Mapping[str, float]) -> tuple[str, ...]:
-        """The species of a feed (mass fractions) that have half-reactions, in its order."""
-        return tuple(name for name, y in feed.items() if y > 0.0 and self.half_reactions(name))
-
-    def precursor(self, feed: Mapping[str, float]) -> str | None:
-        """The first of a feed's precursors, or None."""
-        return next(iter(self.precursors(feed)), None)
-
     def titrated_sites(self, species: str) -> tuple[str, ...]:
         """The site species that the half-reactions of `species` make and do not consume: all of its making on a saturated surface.
 

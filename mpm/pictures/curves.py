@@ -20,7 +20,6 @@ from mpm.pictures.maps import name_of, values_of
 from mpm.pictures.outline import MM, OKABE_ITO, formula
 from mpm.report.balances import LIMIT
 from mpm.report.coating import exit_column
-from mpm.report.dosing import dosed_species, dosing_inlets, sites_made_by
 from mpm.report.fieldnames import NOTHING
 
 Floats = NDArray[np.float64]
@@ -80,12 +79,12 @@ def history_figure(run: Run) -> Figure:
 def titrations(run: Run) -> list[tuple[str, dict[str, Floats]]]:
     """For each inlet with a titration in the history: what its coverage is of, and the columns by their last name."""
     found = []
-    for inlet in dosing_inlets(run.case):
+    for inlet in run.case.dosing_inlets:
         prefix = f"titration.{inlet.name}."
         curves = {kind: run.history[prefix + kind] for kind in TITRATION if prefix + kind in run.history}
         if curves:
-            species = dosed_species(run.case, inlet)
-            sites = " + ".join(map(formula, sites_made_by(run.case, inlet)))
+            species = run.case.precursor(inlet)
+            sites = " + ".join(map(formula, run.case.sites_made_by(inlet)))
             found.append(
                 (f"{sites}, made by {formula(species or '')} from inlet {literal(inlet.name)}", curves)
             )
@@ -169,7 +168,7 @@ def exits(run: Run) -> list[tuple[str, str, tuple[str, ...], int]]:
     """Zone, inlet, site species that its precursor makes, and the column where solids leave, of each zone that doses a moving bed."""
     if not any(layer.moving for layer in run.case.geometry.layers):
         return []
-    inlets = {inlet.name: sites_made_by(run.case, inlet) for inlet in dosing_inlets(run.case)}
+    inlets = {inlet.name: run.case.sites_made_by(inlet) for inlet in run.case.dosing_inlets}
     found = []
     for zone in run.case.geometry.zones:
         sites = inlets.get(zone.inlet, ()) if zone.inlet else ()

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mpm.errors import InputError
-from mpm.report.dosing import fed_species, made_sites
+from mpm.report.dosing import made_sites
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +51,7 @@ def figure_of(run: Run, name: str | None, **options: Any) -> Figure:
 
 def field_called(run: Run, name: str | None) -> str:
     """The full name of what is meant."""
-    sites, species = made_sites(run.case), fed_species(run.case)
+    sites, species = made_sites(run.case), run.case.fed_species
     if name is None:
         return f"theta_{sites[0]}" if sites else "velocity"
     if name in FIRST_OF:

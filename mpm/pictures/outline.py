@@ -8,10 +8,10 @@ from itertools import pairwise
 
 from matplotlib.axes import Axes
 
-from mpm.case.case import Case, Inlet
+from mpm.case.case import Case
+from mpm.case.ports import Inlet
 from mpm.labels import literal
 from mpm.mesh.grid import Grid
-from mpm.report.dosing import fed_by
 
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 WIDTH = 9.0
@@ -68,7 +68,7 @@ def spread(positions: Sequence[float], distance: float) -> list[float]:
 def draw_ports(axes: Axes, case: Case) -> None:
     """Inlets and outlets as thick lines on their wall, with their names outside and the direction of the gas."""
     species = case.mechanism.species_names
-    fed = {inlet.name: fed_by(inlet, species) for inlet in case.geometry.inlets}
+    fed = {inlet.name: case.fed_by(inlet) for inlet in case.geometry.inlets}
     inlets, outlets = list(case.geometry.inlets), list(case.geometry.outlets)
     for side in ("bottom", "top"):
         on_wall = sorted(

@@ -22,7 +22,7 @@ from mpm.errors import InputError, printable
 from mpm.files import write_atomically
 from mpm.output.results import Run, load_run
 from mpm.output.series import Series
-from mpm.report.dosing import fed_species, made_sites
+from mpm.report.dosing import made_sites
 from mpm.report.fieldnames import FieldName, colour_limits, field_name, superscript
 from mpm.report.quantity import RATIO
 
@@ -62,7 +62,7 @@ def write_scripts(directory: str | Path, say: Callable[[str], None]) -> list[Scr
     Files that cannot be read are named to `say`, and the ranges are those of the others. Raises InputError for a directory without fields.
     """
     run = load_run(directory, say)
-    sites, species, files = made_sites(run.case)[:1], fed_species(run.case)[:1], run.directory
+    sites, species, files = made_sites(run.case)[:1], run.case.fed_species[:1], run.directory
     panels = [f"theta_{name}" for name in sites] + [f"x_{name}" for name in species]
     written = [_write(run, files.fields, VIEW, panels or ["velocity"], say)]
     if files.phases.steps:

@@ -43,7 +43,7 @@ from mpm.pictures.curves import (
 )
 from mpm.pictures.maps import ends_of, map_figure, when
 from mpm.pictures.outline import OKABE_ITO
-from mpm.report.dosing import fed_species, made_sites
+from mpm.report.dosing import made_sites
 from mpm.report.fieldnames import Limits, field_name
 
 log = logging.getLogger("mpm")
@@ -176,7 +176,7 @@ def maps(run: Run, snapshot: Snapshot, suffix: str) -> Iterator[Picture]:
     wanted: dict[str, str] = {}
     for site in made_sites(run.case):
         wanted[f"theta_{site}"] = "coverage" if not wanted else f"coverage_{site}"
-    wanted |= {f"x_{species}": f"map_{species}" for species in fed_species(run.case)}
+    wanted |= {f"x_{species}": f"map_{species}" for species in run.case.fed_species}
     if (
         "cvd_rate" in snapshot.cell_data
         and ends_of(run, [snapshot], "cvd_rate")[1] > field_name("cvd_rate").nothing

@@ -15,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mpm.case.case import Output
+from mpm.case.options import Output
 from mpm.case.profile import PRESETS
 from mpm.case.sources import merge, read_toml
 from mpm.errors import InputError
-from mpm.files import read_text
 from mpm.output.directory import RunDirectory
 from mpm.parallel import on_root
 from mpm.reactor.records import totals
@@ -47,17 +46,15 @@ def identity(case: Case) -> Identity:
     The mesh follows from the case; files count with their content (a mechanism's tables and a shared geometry are in the case).
     """
     content = case.to_dict()
-    motion = content["motion"]
-    motion["profile"] = profile = _profile(motion["profile"])
+    profile = case.motion.profile_content
+    if case.motion.profile not in PRESETS:
+        profile = _digest(profile)
+    content["motion"]["profile"] = profile
     for table, key in (("time", "end"), ("chemistry", "mechanism"), ("chemistry", "name")):
         content[table].pop(key, None)
     for name in ("title", "output"):
         content.pop(name, None)
     return {"format": FORMAT, "profile": profile, "case": _digest(json.dumps(content, sort_keys=True))}
-
-
-def _profile(name: str) -> str:
-    return name if name in PRESETS else _digest(read_text(name))
 
 
 def _digest(text: str) -> str:

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.mesh.grid import ON_EDGE, Grid
-from mpm.report.dosing import dosed_species, zone_of
+from mpm.report.dosing import zone_of
 from mpm.report.records import State, Totals, running_surface
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Zone
+    from mpm.case.case import Case
+    from mpm.case.zones import Zone
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
     heights = grid.dy[state.reactive_rows[inside]]
     result: dict[str, dict[str, Any]] = {}
     for inlet in case.geometry.inlets:
-        species, zone = dosed_species(case, inlet), zone_of(case, inlet)
+        species, zone = case.precursor(inlet), zone_of(case, inlet)
         if species is None or zone is None:
             continue
         theta = titrated(case, species, state.theta)[inside]
@@ -81,7 +82,7 @@ def utilisation(case: Case, grid: Grid, totals: Totals) -> dict[str, float]:
     """Per dosing inlet: precursor reacted on surfaces in its zone over what it has fed."""
     result = {}
     for inlet in case.geometry.inlets:
-        species, zone = dosed_species(case, inlet), zone_of(case, inlet)
+        species, zone = case.precursor(inlet), zone_of(case, inlet)
         if species is None or zone is None:
             continue
         k = case.geometry.inlets.index(inlet)
@@ -111,13 +112,12 @@ def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[
         layer = next(l for l in case.geometry.layers if l.name == name)
         inside = grid.layer_rows(name)
         rows = (totals.reactive_rows >= inside.start) & (totals.reactive_rows < inside.stop)
-        assert layer.material is not None
         length = grid.length
         if layer.moving and case.fidelity == "steady":
             length = abs(case.motion.mean_velocity)
         elif layer.moving:
             length = case.direction * (totals.slid - (before.slid if before else 0.0))
-        area = layer.material.surface_to_volume * layer.height * length
+        area = layer.solid.surface_to_volume * layer.height * length
     for solid in case.mechanism.films:
         amount = grown = 0.0
         for index, reaction in enumerate(running_surface(case, totals.names)):

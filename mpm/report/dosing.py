@@ -1,20 +1,16 @@
-"""What the inlets of a case dose: species, sites that these make, zones, and whether it is enough."""
+"""Whether what the inlets of a case dose is enough, and what is made of it; what they dose says the case itself."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from mpm.physics.saturation import molecules_per_site
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Inlet, Zone
-
-
-def dosed_species(case: Case, inlet: Inlet) -> str | None:
-    """The precursor an inlet doses: its first species that reacts on surfaces, or None."""
-    return case.mechanism.precursor(inlet.mass_fractions)
+    from mpm.case.case import Case
+    from mpm.case.ports import Inlet
+    from mpm.case.zones import Zone
 
 
 def zone_of(case: Case, inlet: Inlet) -> Zone | None:
@@ -22,31 +18,9 @@ def zone_of(case: Case, inlet: Inlet) -> Zone | None:
     return next((zone for zone in case.geometry.zones if zone.inlet == inlet.name), None)
 
 
-def fed_by(inlet: Inlet, species: Sequence[str]) -> list[str]:
-    """Those of the `species` that an inlet feeds, in their order."""
-    return [name for name in species if inlet.mass_fractions.get(name, 0.0) > 0.0]
-
-
-def dosing_inlets(case: Case) -> list[Inlet]:
-    """Inlets that feed a species of the mechanism."""
-    return [inlet for inlet in case.geometry.inlets if fed_by(inlet, case.mechanism.species_names)]
-
-
-def fed_species(case: Case) -> list[str]:
-    """Species fed by any inlet, in the mechanism's order."""
-    fed = {name for inlet in case.geometry.inlets for name in fed_by(inlet, case.mechanism.species_names)}
-    return [name for name in case.mechanism.species_names if name in fed]
-
-
-def sites_made_by(case: Case, inlet: Inlet) -> tuple[str, ...]:
-    """Site species whose coverage this inlet's titration counts; empty when nothing it feeds reacts on the surface."""
-    species = dosed_species(case, inlet)
-    return () if species is None else case.mechanism.titrated_sites(species)
-
-
 def made_sites(case: Case) -> list[str]:
     """Site species worth a map: of two that add up to one, the one the first dosing inlet makes."""
-    made = list(dict.fromkeys(site for inlet in dosing_inlets(case) for site in sites_made_by(case, inlet)))
+    made = list(dict.fromkeys(site for inlet in case.dosing_inlets for site in case.sites_made_by(inlet)))
     return made[:1] if len(case.mechanism.site_names) == 2 else made
 
 
@@ -79,7 +53,7 @@ class Excess(NamedTuple):
 
 def inlet_excess(case: Case, inlet: Inlet) -> Excess | None:
     """The excess of an inlet; None without a moving bed or a surface reaction."""
-    layer, species = case.geometry.moving_layer, dosed_species(case, inlet)
+    layer, species = case.geometry.moving_layer, case.precursor(inlet)
     if layer is None or layer.material is None or species is None or case.motion.mean_velocity == 0.0:
         return None
     concentration = case.feed_concentrations(inlet.mass_fractions)[species]

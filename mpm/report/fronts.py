@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from mpm.mesh.grid import ON_EDGE, Grid
 from mpm.report.balances import FLOOR
 from mpm.report.coating import titrated
-from mpm.report.dosing import dosed_species
 from mpm.report.records import State
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Inlet
+    from mpm.case.case import Case
+    from mpm.case.ports import Inlet
 
 Floats = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
     """
     result: dict[str, dict[str, Any]] = {}
     for inlet in case.geometry.inlets:
-        species = dosed_species(case, inlet)
+        species = case.precursor(inlet)
         if species is None or species not in state.concentration:
             continue
         field = state.concentration[species]
@@ -106,8 +106,8 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
             coverage = _layer_coverage(grid, state, made, layer.name)
             if coverage is not None:
                 incoming = None
-                if layer.moving and case.geometry.bed_inflow == "fresh" and layer.material is not None:
-                    fresh = layer.material.initial_coverage
+                if layer.moving and case.geometry.bed_inflow == "fresh":
+                    fresh = layer.solid.initial_coverage
                     incoming = sum(fresh.get(site, 0.0) for site in case.mechanism.titrated_sites(species))
                 at = coverage_front(grid, coverage, inlet.center, incoming, case.direction)
                 if at is not None:

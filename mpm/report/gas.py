@@ -102,7 +102,7 @@ def contamination(case: Case, grid: Grid, totals: Totals, state: State) -> dict[
             continue
         for number, zone in enumerate(case.geometry.zones, start=1):
             own = next((inlet for inlet in case.geometry.inlets if inlet.name == zone.inlet), None)
-            if own is not None and own.mass_fractions.get(species, 0.0) > 0.0:
+            if own is not None and species in own.feed:
                 continue
             columns = grid.zone_of_column == number
             amount = 0.0 if case.fidelity == "steady" else float(weight @ field[:, columns].sum(axis=1))

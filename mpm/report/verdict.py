@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from mpm.report.dosing import dosed_species, zone_of
+from mpm.report.dosing import zone_of
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -56,7 +56,7 @@ def _coating(case: Case, summary: Mapping[str, Any]) -> list[str]:
     alike: dict[tuple[str | None, str], list[str]] = {}
     for inlet in case.geometry.inlets:
         if "exit_mean" in reported.get(inlet.name, {}):
-            species = dosed_species(case, inlet)
+            species = case.precursor(inlet)
             alike.setdefault((species, _made(case, species)), []).append(inlet.name)
     return [_of_inlets(case, summary, species, made, names) for (species, made), names in alike.items()]
 
@@ -65,7 +65,7 @@ def _no_coating(case: Case) -> str:
     """Why no coverage is reported where solids leave a zone."""
     from mpm.report.coating import conveyed_layer
 
-    dosing = [inlet for inlet in case.geometry.inlets if dosed_species(case, inlet) is not None]
+    dosing = [inlet for inlet in case.geometry.inlets if case.precursor(inlet) is not None]
     if conveyed_layer(case) is None or not dosing:
         return "nothing has been coated: no inlet doses a surface"
     if all(zone_of(case, inlet) is None for inlet in dosing):

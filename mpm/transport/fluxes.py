@@ -24,7 +24,8 @@ from mpm.physics.exponentials import bernoulli
 from mpm.physics.porous import effective_diffusivity
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Inlet, Outlet
+    from mpm.case.case import Case
+    from mpm.case.ports import Inlet, Outlet
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

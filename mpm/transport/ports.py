@@ -13,7 +13,8 @@ from mpm.parallel import total
 from mpm.transport.fluxes import FluxOperator
 
 if TYPE_CHECKING:
-    from mpm.case.case import Case, Inlet
+    from mpm.case.case import Case
+    from mpm.case.ports import Inlet
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mpm.case.case import Case
 from mpm.output.results import Run
-from mpm.report.dosing import inlet_excess, sites_made_by
+from mpm.report.dosing import inlet_excess
 from mpm.report.fronts import coverage_front, layer_mean
 from reproduction.row import Checks, Finding, row
 from reproduction.store import Lab
@@ -50,7 +50,7 @@ def increasing(values: list[float], margin: float = 0.0) -> bool:
 def bed_front(run: Run, inlet: str, index: int = -1) -> float | None:
     """Where the coverage that an inlet makes passes 1/2 in the bed at a stored time (`mpm.report.fronts.coverage_front`)."""
     port = next(i for i in run.case.geometry.inlets if i.name == inlet)
-    (site,) = sites_made_by(run.case, port)
+    (site,) = run.case.sites_made_by(port)
     profile = layer_mean(run.grid, run.field(run.snapshot(index), f"theta_{site}"), "bed")
     bed = run.case.geometry.moving_layer
     assert bed is not None and bed.material is not None
