@@ -126,7 +126,8 @@ def test_phases_of_a_resumed_run(change: dict[str, Any], tmp_path: Path) -> None
     whole = case.with_({"time.end": "0.283 s"})  # ends within a step
 
     def stop(reactor: Reactor) -> None:
-        reactor._stop = reactor.time > last.since + 0.3 * PERIOD
+        if reactor.time > last.since + 0.3 * PERIOD:
+            reactor.stop()
 
     halting = case.with_({"output.every": "7 ms"})
     Reactor(case, MPI.COMM_SELF).run(output=tmp_path / "once")
@@ -153,7 +154,8 @@ def test_phases_before_a_state_that_was_not_in_the_last_cycle(tmp_path: Path) ->
     case = resolved(time__end="1 s")
 
     def stop(reactor: Reactor) -> None:
-        reactor._stop = reactor.time > 0.2
+        if reactor.time > 0.2:
+            reactor.stop()
 
     with pytest.raises(Interrupted):
         Reactor(case, MPI.COMM_SELF).run(output=tmp_path, callback=stop)
