@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from xml.sax.saxutils import quoteattr
-
 from mpm.errors import printable
+
+_QUOTE = {'"': "&quot;"}
 
 
 def literal(text: str) -> str:
@@ -14,4 +14,13 @@ def literal(text: str) -> str:
 
 def xml_attribute(text: str) -> str:
     """`text` as the quoted value of an attribute, quotes included."""
-    return quoteattr(text, {'"': "&quot;"})
+    from xml.sax.saxutils import quoteattr  # which loads urllib: only where a file is written
+
+    return quoteattr(text, _QUOTE)
+
+
+def from_xml_attribute(text: str) -> str:
+    """The text that `xml_attribute` has written between the quotes."""
+    from xml.sax.saxutils import unescape
+
+    return unescape(text, {entity: character for character, entity in _QUOTE.items()})

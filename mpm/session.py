@@ -10,19 +10,14 @@ from dataclasses import fields as fields_of
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-
 from mpm.advice.checks import check_case
-from mpm.advice.screen import PAGE, print_report
 from mpm.advice.sheet import case_sheet
-from mpm.advice.sketch import sketch
+from mpm.advice.sketch import PAGE, sketch
 from mpm.case.case import Case, load_case
 from mpm.case.marks import Marked
 from mpm.errors import InputError
 from mpm.markup import columns, items, paragraph, preformatted, table, text
 from mpm.output import results
-from mpm.report.notebook import result_html
-from mpm.report.verdict import verdict
 from mpm.screen import Listing, screen
 
 if TYPE_CHECKING:
@@ -46,6 +41,10 @@ class Check(Mapping[str, Any]):
         return len(self.numbers)
 
     def __repr__(self) -> str:
+        from rich.console import Console
+
+        from mpm.advice.screen import print_report
+
         terminal, page = screen(), io.StringIO()
         width = terminal.width if terminal.is_terminal else PAGE
         plain: dict[str, Any] = {"force_terminal": False, "force_jupyter": False, "color_system": None}
@@ -157,10 +156,14 @@ class Run(results.Run):
         return report(self.directory.path, output)
 
     def __repr__(self) -> str:
+        from mpm.report.verdict import verdict
+
         said = verdict(self.case, self.summary) if self.summary else "not ended yet"
         return f"Run {self.directory.path}: {said}"
 
     def _repr_html_(self) -> str:
+        from mpm.report.notebook import result_html
+
         return result_html(self.case, self.summary, str(self.directory.path))
 
 

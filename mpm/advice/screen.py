@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from rich.console import Console
+from typing import TYPE_CHECKING, Any
 
 from mpm.advice.sheet import case_sheet
-from mpm.advice.sketch import pen_for, sketch
+from mpm.advice.sketch import PAGE, pen_for, sketch
 from mpm.case.case import Case
 from mpm.case.marks import MARKS, Marked
 from mpm.errors import printable
 from mpm.report.tables import print_warnings
 from mpm.screen import say
 
-PAGE = 80
-"""Width of the sketch where there is no edge to go by."""
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def print_report(case: Case, report: dict[str, Any], console: Console) -> None:

@@ -16,6 +16,8 @@ from mpm.screen import lines_of, together
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
+PAGE = 80
+"""Columns of a page where there is no edge of a terminal to go by."""
 NARROWEST = 40
 """Columns that a sketch takes at least."""
 MOST_ROWS = 3

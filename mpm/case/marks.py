@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-
-from rich.console import Console
+from typing import TYPE_CHECKING
 
 from mpm.case.case import Case
 from mpm.case.keys import Value, values
 from mpm.screen import Sheet, number, together
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 MARKS = (
     "not typed in the case but taken from (default) the program, (built-in) its materials and mechanisms, (base) the shared geometry, "

@@ -14,14 +14,13 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.sax.saxutils import unescape
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpm.errors import InputError, MpmError
 from mpm.files import write_atomically, write_in_place
-from mpm.labels import xml_attribute
+from mpm.labels import from_xml_attribute, xml_attribute
 
 VTK_QUAD = 9
 CLOSING = "</Collection>\n</VTKFile>\n"
@@ -138,9 +137,7 @@ def read_vtu(path: str | Path) -> Snapshot:
             values = np.frombuffer(
                 zlib.decompress(appended[start + 32 : start + 32 + size]), dtype=kind.lower()
             )
-            arrays[unescape(name, {"&quot;": '"'})] = (
-                values.reshape(-1, int(components)) if components else values
-            )
+            arrays[from_xml_attribute(name)] = values.reshape(-1, int(components)) if components else values
         found = re.search(rb'Name="TimeValue"[^>]*>([^<]+)<', head)
         points, quads = arrays.pop("Points"), arrays.pop("connectivity").reshape(-1, 4)
         del arrays["offsets"], arrays["types"]
