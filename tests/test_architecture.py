@@ -108,6 +108,16 @@ def test_no_two_rooms_see_each_other() -> None:
         left = {room: seen for room, seen in left.items() if room not in free}
 
 
+def test_files_do_not_import_each_other_in_a_circle() -> None:
+    """Fails when two files need each other, be it for a type alone: neither can be read without the other."""
+    left = {module: imports(module) for module in MODULES}
+    while free := {m for m, seen in left.items() if not seen & left.keys()}:
+        left = {module: seen for module, seen in left.items() if module not in free}
+    while free := left.keys() - set().union(*left.values()):  # those that only lead to a circle
+        left = {module: seen for module, seen in left.items() if module not in free}
+    assert not left, f"a circle among {sorted(left)}"
+
+
 def test_every_room_says_what_it_is_for() -> None:
     """Fails when a room has no sentence at its door."""
     for room in MAY_SEE:

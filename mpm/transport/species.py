@@ -62,7 +62,7 @@ class Transport:
 
     def __init__(self, case: Case, strip: Strip, coverage: Coverage):
         self.case, self.strip, self.coverage = case, strip, coverage
-        self.roles = Roles.of(case.mechanism, fed_species(case))
+        self.roles = Roles.of(case.mechanism, set(case.fed_species))
         self.names = (*self.roles.coupled, *self.roles.products)
         self.coupled = len(self.roles.coupled)
         self.reactions = Reactions(case, strip, coverage, self.roles)
@@ -226,15 +226,6 @@ class Transport:
         start = np.maximum(new[:, cells], LOWEST)
         balanced = balance_locally(start, diagonal[:, cells], inflow, sources, idle, tries=3)
         return np.where(inflow > 0.0, balanced, 0.0)
-
-
-def fed_species(case: Case) -> set[str]:
-    return {
-        name
-        for inlet in case.geometry.inlets
-        for name, c in case.feed_concentrations(inlet.mass_fractions).items()
-        if c > 0.0
-    }
 
 
 class _Newton:
