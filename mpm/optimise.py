@@ -35,13 +35,19 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
 
 log = logging.getLogger("mpm")
-STEP = 0.1  # first step of the search, in powers of e
-CLOSE = 1e-3  # relative change of the doses at which the search ends
-SLACK = 1e-4  # titration that may be missing
-MARGIN = 1e-3  # by how much the search aims higher, for its own tolerance
+STEP = 0.1
+"""First step of the search, in powers of e."""
+CLOSE = 1e-3
+"""Relative change of the doses at which the search ends."""
+SLACK = 1e-4
+"""Titration that may be missing."""
+MARGIN = 1e-3
+"""By how much the search aims higher, for its own tolerance."""
+UNSOLVED = 1e3
+"""Cost of doses whose steady state was not found; the first point costs about 1."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Point:
     """One steady state: the doses by key; by inlet the mean exit coverage `exits`, the dose `ratios` and the `excess` numbers (molecules
     per site); `fed` precursor and `cvd` events [mol per metre of depth and second]."""
@@ -89,14 +95,15 @@ class Search:
             log.warning("optimise: %s", error)
             return None
         self._flow = (velocities, reactor.flow)
-        dosed = {e[0] for i in case.geometry.inlets if (e := inlet_excess(case, i))}
+        found = (inlet_excess(case, inlet) for inlet in case.geometry.inlets)
+        dosed = dict.fromkeys(excess.species for excess in found if excess is not None)
         point = Point(
-            doses,
-            {name: entry["exit_mean"] for name, entry in summary["titration"].items()},
-            summary["dose_ratio"],
-            summary["excess_number"],
-            sum(summary["species"][name]["fed"] for name in dosed),
-            summary.get("cvd", {}).get("total", 0.0),  # absent without a gas-phase reaction
+            doses=doses,
+            exits={name: entry["exit_mean"] for name, entry in summary["titration"].items()},
+            ratios=summary["dose_ratio"],
+            excess=summary["excess_number"],
+            fed=sum(summary["species"][name]["fed"] for name in dosed),
+            cvd=summary.get("cvd", {}).get("total", 0.0),  # absent without a gas-phase reaction
         )
         self.points.append(point)
         return point
@@ -143,7 +150,7 @@ class Search:
 
         def cost(logs: NDArray[np.float64]) -> float:
             point = solved(logs)
-            return self.cost(point) if point else 1e3
+            return self.cost(point) if point else UNSOLVED
 
         def lacking(logs: NDArray[np.float64]) -> NDArray[np.float64]:
             """Titration above the aim, by inlet."""
@@ -211,10 +218,11 @@ def write_points(directory: Path, search: Search) -> None:
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     first = search.points[0]
-    names = [f"titration.{n}.exit_mean" for n in first.exits]
-    names += [f"{kind}.{n}" for kind in ("dose_ratio", "excess_number") for n in first.ratios]
+    names = [f"titration.{inlet}.exit_mean" for inlet in first.exits]
+    names += [f"{kind}.{inlet}" for kind in ("dose_ratio", "excess_number") for inlet in first.ratios]
     table.writerow([*first.doses, *names, "fed", "cvd.total", "cost"])
-    for p in search.points:
-        numbers = (p.doses, p.exits, p.ratios, p.excess)
-        table.writerow([*(v for group in numbers for v in group.values()), p.fed, p.cvd, search.cost(p)])
+    for point in search.points:
+        groups = (point.doses, point.exits, point.ratios, point.excess)
+        values = [value for group in groups for value in group.values()]
+        table.writerow([*values, point.fed, point.cvd, search.cost(point)])
     write_atomically(directory / "points.csv", text.getvalue())

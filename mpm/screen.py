@@ -11,7 +11,7 @@ import re
 import shlex
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from mpm.errors import printable
@@ -117,6 +117,12 @@ def say(console: Console, text: str, indent: int = 0, hang: int = 4, style: str 
 
     for line in lines_of(text, console.width, indent, hang):
         console.print(Text(line, style=style), soft_wrap=True)
+
+
+def print_warnings(console: Console, warnings: Iterable[str]) -> None:
+    """One paragraph for each sentence."""
+    for sentence in warnings:
+        say(console, f"warning: {printable(sentence)}", style="yellow")
 
 
 def lines_of(text: str, width: int, indent: int = 0, hang: int = 4) -> list[str]:

@@ -80,7 +80,9 @@ def test_a_coverage_a_little_below_the_target_is_said_to_be_so(capsys: pytest.Ca
     """Fails when a coverage below the target counts as reaching it and nothing says why."""
     search = Search(zone(mesh=TINY), doses_of(zone(mesh=TINY), 0.99, False), 0.99, 10.0)
     for share, said in ((0.9898, "too lean"), (0.98995, "reaches it to 0.0001"), (0.9901, "reaches it")):
-        print_point(search, Point({}, {"tma": share}, {"tma": 1.0}, {"tma": 1.0}, 1.0, 0.0), screen())
+        one = {"tma": 1.0}
+        point = Point(doses={}, exits={"tma": share}, ratios=one, excess=one, fed=1.0, cvd=0.0)
+        print_point(search, point, screen())
         assert " ".join(capsys.readouterr().out.split()).endswith(f"; {said}")
 
 

@@ -9,8 +9,7 @@ from mpm.advice.sketch import PAGE, pen_for, sketch
 from mpm.case.case import Case
 from mpm.case.marks import MARKS, Marked
 from mpm.errors import printable
-from mpm.report.tables import print_warnings
-from mpm.screen import say
+from mpm.screen import print_warnings, say
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -12,8 +12,7 @@ from mpm.advice.checks import check_case
 from mpm.files import write_picture
 from mpm.optimise import SLACK, Point, Search, states
 from mpm.report.quantities import quantity
-from mpm.report.tables import print_warnings
-from mpm.screen import number, print_steps, say, together
+from mpm.screen import number, print_steps, print_warnings, say, together
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

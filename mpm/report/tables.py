@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Console
 
 from mpm.case.case import Case
-from mpm.errors import printable
 from mpm.mesh.grid import Grid
 from mpm.report.balances import TERMS
 from mpm.report.quantities import COST, headed, quantity, worst_balance_error
 from mpm.report.rounding import shown
 from mpm.report.trees import flatten
-from mpm.screen import Listing, Sheet, number, say
+from mpm.screen import Listing, Sheet, number, print_warnings, say
 
 
 def print_mesh(case: Case, console: Console) -> None:
@@ -73,12 +72,6 @@ def print_summary(summary: dict[str, Any], console: Console, warnings: Sequence[
     if warnings:
         console.print()
     print_warnings(console, warnings)
-
-
-def print_warnings(console: Console, warnings: Iterable[str]) -> None:
-    """One paragraph for each sentence."""
-    for sentence in warnings:
-        say(console, f"warning: {printable(sentence)}", style="yellow")
 
 
 def _balances(sheet: Sheet, summary: dict[str, Any], numbers: dict[str, float], steady: bool) -> None:
