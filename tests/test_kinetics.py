@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mpm.case.case import load_case
-from mpm.physics.kinetics import GasKinetics, Roles, SurfaceKinetics
+from mpm.physics.kinetics import GasKinetics, SurfaceKinetics
 from mpm.physics.mechanism import Mechanism, Site, Species, SurfaceReaction
+from mpm.physics.roles import Roles
 
 from .cases import CASES, rate
 

@@ -225,6 +225,7 @@ def _gas_reaction(
         raise reject(repr(table.equation), "a gas reaction of two different species into gas species")
     if table.sticking is not None or table.A is None:
         raise reject("sticking" if table.sticking is not None else "no A", GAS_RATE.accepted, key="A")
+    first, second = left
     return GasReaction(
         key=key,
         equation=write_equation(left, right),
@@ -232,6 +233,6 @@ def _gas_reaction(
         b=table.b,
         Ea=table.Ea,
         reference_temperature=table.reference_temperature,
-        reactants=dict.fromkeys(left, 1),
-        nu=_net(left, right),
+        nu_gas=_net(left, right),
+        reactants=(first, second),
     )

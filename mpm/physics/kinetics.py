@@ -13,7 +13,6 @@ concentration (a Newton iterate) leaves Q as it is at zero and enters all r_r li
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,55 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpm.physics.exponentials import dphi1, dphi2, phi1, phi2
-from mpm.physics.mechanism import GasReaction, SurfaceReaction
 
 if TYPE_CHECKING:
     from mpm.physics.mechanism import Mechanism
 
 Floats = NDArray[np.float64]
-Reaction = SurfaceReaction | GasReaction
-
-
-@dataclass(frozen=True)
-class Roles:
-    """Which species a run has to follow.
-
-    `coupled` react and are solved together; `products` are only made (or inert) and follow one by one; all others stay absent
-    because nothing feeds or makes them.
-    """
-
-    coupled: tuple[str, ...]
-    products: tuple[str, ...]
-
-    @classmethod
-    def of(cls, mechanism: Mechanism, fed: set[str]) -> Roles:
-        """Species that can appear when `fed` enter: a reaction runs once all its gas reactants are present."""
-        present = set(fed)
-        reactions: list[Reaction] = [*mechanism.surface_reactions, *mechanism.gas_reactions]
-        while True:
-            made = {
-                name
-                for reaction in reactions
-                if reactants(reaction) <= present
-                for name in stoichiometry(reaction)
-            }
-            if made <= present:
-                break
-            present |= made
-        running = [r for r in reactions if reactants(r) <= present]
-        reacting = {name for reaction in running for name in reactants(reaction)}
-        order = [name for name in mechanism.species_names if name in present]
-        return cls(tuple(n for n in order if n in reacting), tuple(n for n in order if n not in reacting))
-
-
-def reactants(reaction: Reaction) -> set[str]:
-    """Gas species whose concentrations set the rate of a surface or gas reaction."""
-    return {reaction.gas} if isinstance(reaction, SurfaceReaction) else set(reaction.reactants)
-
-
-def stoichiometry(reaction: Reaction) -> Mapping[str, float]:
-    """Signed gas stoichiometry of a surface or gas reaction, per event."""
-    return reaction.nu_gas if isinstance(reaction, SurfaceReaction) else reaction.nu
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +54,7 @@ class SurfaceKinetics:
     ):
         self.coupled, self.surface, self.sites = coupled, surface, sites
         names = mechanism.site_names
-        self.reactions = [r for r in mechanism.surface_reactions if r.gas in coupled]
+        self.reactions = mechanism.running_surface(coupled)
         self.gas = [coupled.index(r.gas) for r in self.reactions]
         self.site = [names.index(r.site) for r in self.reactions]
         molar_mass = {s.name: s.molar_mass for s in mechanism.species}
@@ -264,12 +219,9 @@ class GasKinetics:
 
     def __init__(self, mechanism: Mechanism, coupled: tuple[str, ...], temperature: ArrayLike):
         self.coupled = coupled
-        self.reactions = [r for r in mechanism.gas_reactions if reactants(r) <= set(coupled)]
+        self.reactions = mechanism.running_gas(coupled)
         self.constant = [r.rate_constant(np.asarray(temperature, dtype=float)) for r in self.reactions]
-        self.pairs = []
-        for r in self.reactions:
-            a, b = [name for name, order in r.reactants.items() for _ in range(int(order))]
-            self.pairs.append((coupled.index(a), coupled.index(b)))
+        self.pairs = [(coupled.index(a), coupled.index(b)) for a, b in (r.reactants for r in self.reactions)]
 
     def rates(self, concentration: Floats) -> tuple[Floats, Floats]:
         """Rates (reactions, n) and derivatives (reactions, coupled, n); negative concentrations count as none."""

@@ -13,7 +13,7 @@ Mechanisms are read from files and from the case by `mpm.case.chemistry`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,7 +45,10 @@ class Site:
 
 @dataclass(frozen=True, kw_only=True)
 class _Reaction:
-    """What both kinds have: the key in the file, the equation, and k(T) = A (T/T_ref)^b exp(-Ea/(R T))."""
+    """What both kinds have: the key in the file, the equation, and k(T) = A (T/T_ref)^b exp(-Ea/(R T)).
+
+    nu_gas: signed molecules of each gas species per event, products positive.
+    """
 
     key: str
     equation: str
@@ -53,6 +56,7 @@ class _Reaction:
     b: float
     Ea: float
     reference_temperature: float
+    nu_gas: Mapping[str, float]
 
     def __str__(self) -> str:
         return self.equation
@@ -73,13 +77,12 @@ class _Reaction:
 class SurfaceReaction(_Reaction):
     """A gas meets a site: r = k C_gas theta_site [mol of events/m2/s].
 
-    nu_gas, nu_site, film: signed molecules, sites and formula units per event (products positive), so
-    (5-18) has nu_gas = {H2O: -3, CH4: 4}, nu_site = {OAl(CH3)2: -2, OH: 2}, film = {Al2O3: 1}.
+    nu_site, film: signed sites and formula units of solid products per event, so (5-18) has nu_gas = {H2O: -3, CH4: 4},
+    nu_site = {OAl(CH3)2: -2, OH: 2}, film = {Al2O3: 1}.
     """
 
     gas: str
     site: str
-    nu_gas: Mapping[str, float]
     nu_site: Mapping[str, float]
     film: Mapping[str, float] = field(default_factory=dict)
     sticking: float | None = None
@@ -106,6 +109,11 @@ class SurfaceReaction(_Reaction):
         return None if self.sticking is None else np.asarray(self.sticking * self._activation(temperature))
 
     @property
+    def reactants(self) -> tuple[str]:
+        """The gas species whose concentration sets the rate."""
+        return (self.gas,)
+
+    @property
     def product_sites(self) -> tuple[str, ...]:
         """The states that the sites change to."""
         return tuple(name for name, nu in self.nu_site.items() if nu > 0.0)
@@ -118,10 +126,9 @@ class SurfaceReaction(_Reaction):
 
 @dataclass(frozen=True, kw_only=True)
 class GasReaction(_Reaction):
-    """Two species meet in the gas: r = k C_1 C_2 [mol of events/m3 of gas/s]; `nu` signed molecules per event."""
+    """Two species meet in the gas: r = k C_1 C_2 [mol of events/m3 of gas/s]."""
 
-    reactants: Mapping[str, int]
-    nu: Mapping[str, float]
+    reactants: tuple[str, str]
 
     def rate_constant(self, temperature: ArrayLike) -> Floats:
         """k [m3/mol/s], of the shape of `temperature` [K]."""
@@ -146,6 +153,14 @@ class Mechanism:
     @property
     def site_names(self) -> tuple[str, ...]:
         return tuple(site.name for site in self.sites)
+
+    def running_surface(self, present: Collection[str]) -> list[SurfaceReaction]:
+        """Surface reactions whose gas is among the species that are present."""
+        return [reaction for reaction in self.surface_reactions if reaction.gas in present]
+
+    def running_gas(self, present: Collection[str]) -> list[GasReaction]:
+        """Gas reactions both of whose reactants are."""
+        return [reaction for reaction in self.gas_reactions if set(reaction.reactants) <= set(present)]
 
     def half_reactions(self, species: str) -> tuple[SurfaceReaction, ...]:
         """The surface reactions that consume `species`: together they are what an ALD half-cycle does."""

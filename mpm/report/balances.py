@@ -67,7 +67,7 @@ def _stoichiometry(case: Case, names: tuple[str, ...], species: str) -> list[tup
     for index, surface in enumerate(running_surface(case, names)):
         terms.append((("surface", index), surface.nu_gas.get(species, 0.0)))
     for index, gas in enumerate(running_gas(case, names)):
-        terms.append((("gas", index), gas.nu.get(species, 0.0)))
+        terms.append((("gas", index), gas.nu_gas.get(species, 0.0)))
     return terms
 
 

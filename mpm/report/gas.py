@@ -109,7 +109,7 @@ def contamination(case: Case, grid: Grid, totals: Totals, state: State) -> dict[
             for index, reaction in enumerate(running_surface(case, totals.names)):
                 amount -= reaction.nu_gas.get(species, 0.0) * float(totals.surface[index][:, columns].sum())
             for index, gas in enumerate(running_gas(case, totals.names)):
-                amount -= gas.nu.get(species, 0.0) * float(totals.gas[index, number])
+                amount -= gas.nu_gas.get(species, 0.0) * float(totals.gas[index, number])
             for k, outlet in enumerate(case.geometry.outlets):
                 if zone.start <= outlet.center < zone.end:
                     amount += float(totals.out[k, i] - totals.back[k, i])

@@ -104,9 +104,9 @@ def run_itself(records: Records) -> dict[str, Any]:
 
 def running_surface(case: Case, names: tuple[str, ...]) -> list[SurfaceReaction]:
     """Surface reactions whose gas is among the species of the run, in the mechanism's order."""
-    return [r for r in case.mechanism.surface_reactions if r.gas in names]
+    return case.mechanism.running_surface(names)
 
 
 def running_gas(case: Case, names: tuple[str, ...]) -> list[GasReaction]:
     """Gas reactions whose reactants all are."""
-    return [r for r in case.mechanism.gas_reactions if set(r.reactants) <= set(names)]
+    return case.mechanism.running_gas(names)

@@ -105,7 +105,7 @@ def growth_share(case: Case, summary: Mapping[str, Any]) -> float | None:
     shares = [
         -count * total / fed[species]
         for reaction in case.mechanism.gas_reactions
-        for species, count in reaction.nu.items()
+        for species, count in reaction.nu_gas.items()
         if count < 0.0 and fed.get(species, 0.0) > 0.0
     ]
     return max(shares, default=None)

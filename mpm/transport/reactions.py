@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.mesh.strip import Strip
-from mpm.physics.kinetics import GasKinetics, Roles, SurfaceKinetics, stoichiometry
+from mpm.physics.kinetics import GasKinetics, SurfaceKinetics
+from mpm.physics.roles import Roles
 from mpm.transport.coverage import Coverage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mpm.case.case import Case
-    from mpm.physics.kinetics import Reaction
+    from mpm.physics.mechanism import GasReaction, SurfaceReaction
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -53,9 +54,9 @@ class Reactions:
         self._nu_surface = self._stoichiometry(self.surface.reactions)
         self._nu_gas = self._stoichiometry(self.gas.reactions)
 
-    def _stoichiometry(self, reactions: Sequence[Reaction]) -> Floats:
+    def _stoichiometry(self, reactions: Sequence[SurfaceReaction | GasReaction]) -> Floats:
         """nu (reactions, species), per event."""
-        rows = [[stoichiometry(r).get(name, 0.0) for name in self.species] for r in reactions]
+        rows = [[r.nu_gas.get(name, 0.0) for name in self.species] for r in reactions]
         return np.array(rows).reshape(len(reactions), len(self.species))
 
     @property

@@ -21,7 +21,7 @@ from mpm.mesh.strip import Strip
 from mpm.numerics.linear import KrylovSolver
 from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.parallel import largest, total
-from mpm.physics.kinetics import Roles
+from mpm.physics.roles import Roles
 from mpm.transport.cell_matrix import CellMatrix, StepMatrix
 from mpm.transport.coverage import Coverage
 from mpm.transport.fluxes import FluxAssembler, FluxOperator, cell_diffusivity
