@@ -30,27 +30,28 @@ def make(
     **change: Any,
 ) -> Any:
     """A box of a few GL50 particles, no cohesion and no body force unless asked."""
-    from mpm.dem.box import Box, BoxSpec, Particles
+    from mpm.dem.box import Box
+    from mpm.dem.spec import BoxSpec, Particles
 
     cohesive = change.pop("cohesion", False)
     stiffness = change.pop("stiffness", 300.0)
     spec = BoxSpec(
-        replace(POWDERS["GL50"], **change),
-        np.array(diameters),
-        10 * D,
-        10 * D,
-        20 * D,
-        base,
-        stiffness,
-        cohesive,
-        steps,
+        powder=replace(POWDERS["GL50"], **change),
+        diameters=np.array(diameters),
+        length=10 * D,
+        depth=10 * D,
+        height=20 * D,
+        base=base,
+        stiffness=stiffness,
+        cohesion=cohesive,
+        steps=steps,
     )
     position = np.array(position, dtype=float)
     particles = Particles(
-        position,
-        np.array(velocity, dtype=float) if len(velocity) else np.zeros_like(position),
-        np.array(spin, dtype=float) if len(spin) else np.zeros_like(position),
-        np.arange(len(position)) % len(diameters),
+        position=position,
+        velocity=np.array(velocity, dtype=float) if len(velocity) else np.zeros_like(position),
+        spin=np.array(spin, dtype=float) if len(spin) else np.zeros_like(position),
+        classes=np.arange(len(position)) % len(diameters),
     )
     return Box(spec, particles, spec.largest_timestep(), tmp_path)
 

@@ -13,9 +13,9 @@ from mpm.physics.conveying import (
 )
 
 from .bed import bed_numbers
-from .box import BoxSpec
 from .case import DemCase
 from .profile import PiecewiseFit, Profile, piecewise_fit
+from .spec import BoxSpec
 from .waveform import Waveform, extension_velocity, peak_displacement
 
 Arrays = dict[str, np.ndarray]

@@ -23,6 +23,8 @@ class Base:
         return 0.0 if self.flat else float(self.positions[:, 2].max() + self.diameter / 2.0)
 
 
+SETTLED = 0.6
+"""Solid fraction of a bed at rest, for counting the particles that fill a height."""
 FLAT = Base(np.zeros((0, 3)), 0.0)
 
 
@@ -77,16 +79,16 @@ class Filling:
 def loose_filling(
     length: float, depth: float, height: float, diameters: np.ndarray, base: Base, seed: int
 ) -> Filling:
-    """A jittered lattice above the base that settles to about `height` (at a solid fraction of 0.6).
+    """A jittered lattice above the base that settles to about `height` (at the solid fraction SETTLED).
 
     `seed` sets the jitter and the order of the sizes. No two particles touch.
     """
     rng = np.random.default_rng(seed)
-    volume = 0.6 * depth * (length * height - tooth_area(base))
+    volume = SETTLED * depth * (length * height - tooth_area(base))
     count = max(1, round(volume / (math.pi / 6.0 * float((diameters**3).mean()))))
     classes = rng.permutation(np.arange(count) % len(diameters))
     largest = float(diameters.max())
-    spacing, jitter = 1.12 * largest, 0.05 * largest
+    spacing, jitter = 1.12 * largest, 0.05 * largest  # at least 1.02 of the largest apart
     nx, ny = max(1, int(length / spacing)), max(1, int(depth / spacing))
     layers = math.ceil(count / (nx * ny))
     k, j, i = np.meshgrid(np.arange(layers), np.arange(ny), np.arange(nx), indexing="ij")

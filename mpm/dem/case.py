@@ -40,6 +40,7 @@ from mpm.units import (
     reject,
 )  # fmt: skip
 
+from .base import SETTLED
 from .powder import POWDERS, SMALLEST, Powder
 from .waveform import Waveform
 from .waveform_input import MeasuredInput, WaveformInput
@@ -269,7 +270,7 @@ class DemCase(Frozen):
     @model_validator(mode="after")
     def can_be_held(self) -> "DemCase":
         box, d = self.box, self.build_powder().diameter
-        bed = 0.6 * box.length * box.depth * box.height / (math.pi / 6.0)
+        bed = SETTLED * box.length * box.depth * box.height / (math.pi / 6.0)
         glued = 0.0 if box.base == "flat" else box.length * box.depth * (d / box.frit_diameter) ** 2
         if bed + glued > MOST_PARTICLES:
             raise reject(

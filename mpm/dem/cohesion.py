@@ -1,7 +1,6 @@
 """Van der Waals cohesion after Rumpf (2-6, 3-8), as a function and as the tables LAMMPS interpolates."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 
@@ -83,8 +82,3 @@ def table_text(
         )
     )
     return f"# Rumpf cohesion, SI units\n\n{keyword}\n{head}\n\n{rows}\n"
-
-
-def write_table(path: Path, *sections: str) -> None:
-    """Write the sections of `table_text` into one file."""
-    path.write_text("\n".join(sections), encoding="utf-8")

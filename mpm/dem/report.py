@@ -13,9 +13,9 @@ from mpm.labels import literal
 from mpm.plain import json_text
 
 from .analysis import Results
-from .box import BoxSpec, Particles
 from .case import DemCase
 from .profile import conditions, scaled_to_mean
+from .spec import BoxSpec, Particles
 from .waveform import HarmonicWaveform, Waveform
 
 BASE, BED, FIT = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito: stay apart for colour-blind readers

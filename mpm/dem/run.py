@@ -20,11 +20,11 @@ from mpm.errors import ConvergenceError, InputError, Interrupted, storage_error
 from mpm.files import lock, write_atomically
 
 from .analysis import Arrays, analyse
-from .box import Particles, load_lammps
+from .box import load_lammps
 from .case import DemCase, load_case
 from .report import draw, write_summary, write_tables
 from .screen import Report, cycles_done, silent
-from .simulate import Simulation
+from .simulate import Simulation, stored_particles
 
 LOCK = "lock"  # the file in a directory that says that a run is at work
 
@@ -104,7 +104,7 @@ def finish(case: DemCase, directory: Path, seconds: float, workers: int) -> dict
     results = analyse(case, simulations[0].spec, masses, records)
     first = simulations[0]
     with np.load(first.state_file) as state:
-        last = Particles(state["position"], state["speed"], state["spin"], state["classes"])
+        last = stored_particles(state)
     write_tables(directory, case, results, first.waveform)
     draw(directory, case, results, (first.spec, last))
     summary = {

@@ -2,7 +2,7 @@
 
 import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +13,24 @@ from mpm.files import load_arrays, write_atomically
 
 from ..constants import GRAVITY
 from .base import FLAT, Base, Filling, fit_length, frit_monolayer, loose_filling, sawtooth_baffle
-from .box import Box, BoxSpec, Particles
+from .box import Box
 from .case import DemCase
 from .gas import GasDrag, slab_solids
 from .sampling import Recorder
 from .screen import cycles_done, settling
+from .spec import BoxSpec, Particles
 from .waveform import Waveform
 
-SETTLE_BLOCKS = 60  # of half the time a particle needs to fall its diameter, at most
-AT_REST = (
-    0.005  # root mean square speed at which the filling has settled, over that of a fall by one diameter
-)
+SETTLING_DRAG = 0.8
+"""Rate of the viscous damping while the filling settles, times sqrt(d/g): particles sink at 1.25 sqrt(g d) at most, too slow to bounce."""
+SETTLE_BLOCKS = 60
+"""Of half of sqrt(d/g), at most: a particle sinks by 37 diameters in them."""
+AT_REST = 0.005
+"""Root mean square speed over sqrt(g d) at which the filling has settled: with that energy it would rise by 1e-5 diameters."""
+CLEARANCE, THROWS = 10.0, 8.0
+"""Room above the filling: diameters, and heights to which the largest speed of the base throws a particle."""
+TOO_FAST = 20.0
+"""Speed over that of base and fall through the bed together that no collision explains; an unstable integration soon passes any bound."""
 Progress = Callable[[float, str], None]  # called with the number of cycles done and what is being done
 
 
@@ -37,21 +44,25 @@ def build(case: DemCase, seed: int) -> tuple[BoxSpec, Filling]:
         length, depth = (fit_length(size, options.frit_diameter) for size in (length, depth))
         base = _glued(case, length, depth)
     filling = loose_filling(length, depth, options.height * d, diameters, base, seed)
-    launch = np.abs(case.build_waveform().velocity(np.linspace(0.0, 1.0, 4001))).max()
-    top = float(filling.positions[:, 2].max()) + 10.0 * d + 4.0 * launch**2 / GRAVITY
+    thrown = fastest(case.build_waveform(), 1.0) ** 2 / (2.0 * GRAVITY)
     spec = BoxSpec(
-        powder,
-        diameters,
-        length,
-        depth,
-        top,
-        base,
-        options.stiffness,
-        options.cohesion,
-        options.steps_per_collision,
-        options.reduced_cohesion,
+        powder=powder,
+        diameters=diameters,
+        length=length,
+        depth=depth,
+        height=float(filling.positions[:, 2].max()) + CLEARANCE * d + THROWS * thrown,
+        base=base,
+        stiffness=options.stiffness,
+        cohesion=options.cohesion,
+        steps=options.steps_per_collision,
+        reduced=options.reduced_cohesion,
     )
     return spec, filling
+
+
+def fastest(waveform: Waveform, span: float) -> float:
+    """Largest component of the base's velocity [m/s] within `span` [s] from the start."""
+    return float(np.abs(waveform.velocity(np.linspace(0.0, span, 4001))).max())
 
 
 def _glued(case: DemCase, length: float, depth: float) -> Base:
@@ -59,6 +70,13 @@ def _glued(case: DemCase, length: float, depth: float) -> Base:
     if options.base == "frit":
         return frit_monolayer(length, depth, options.frit_diameter)
     return sawtooth_baffle(length, depth, options.frit_diameter, options.baffle_height, options.baffle_width)
+
+
+def stored_particles(state: Mapping[str, np.ndarray]) -> Particles:
+    """The bed in a state file."""
+    return Particles(
+        position=state["position"], velocity=state["speed"], spin=state["spin"], classes=state["classes"]
+    )
 
 
 class Simulation:
@@ -79,11 +97,9 @@ class Simulation:
             if gas is None
             else GasDrag(powder, gas.viscosity, gas.density, gas.velocity, gas.frame == "lab")
         )
-        fastest = float(np.abs(self.waveform.velocity(np.linspace(0.0, self.period, 4001))).max())
         drop = math.sqrt(2.0 * GRAVITY * case.box.height * powder.diameter)
-        self.recorder = Recorder(
-            self.spec, 20.0 * (fastest + drop), lambda t: self.waveform.velocity(np.array([t]))[:, 0]
-        )
+        limit = TOO_FAST * (fastest(self.waveform, self.period) + drop)
+        self.recorder = Recorder(self.spec, limit, lambda t: self.waveform.velocity(np.array([t]))[:, 0])
 
     @property
     def state_file(self) -> Path:
@@ -101,7 +117,7 @@ class Simulation:
             self.recorder.restore(saved)
             if done >= self.case.run.cycles:
                 return self.load_arrays() if self.rank == 0 else None
-            start = Particles(saved["position"], saved["speed"], saved["spin"], saved["classes"])
+            start = stored_particles(saved)
         else:
             start = Particles.at_rest(self.filling.positions, self.filling.classes)
         with Box(self.spec, start, self.timestep, self.directory, self.comm) as box:
@@ -128,7 +144,7 @@ class Simulation:
         d = self.spec.powder.diameter
         fall = math.sqrt(d / GRAVITY)
         box.accelerate(0.0, -GRAVITY)
-        box.set_damping(0.8 / fall)
+        box.set_damping(SETTLING_DRAG / fall)
         block = max(1, round(0.5 * fall / self.timestep))
         for _ in range(SETTLE_BLOCKS):
             box.run(block)
