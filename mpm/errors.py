@@ -113,4 +113,9 @@ def nearest(given: str, known: Iterable[str]) -> str | None:
 def suggestion(given: str, known: Iterable[str]) -> str:
     """Return ` (did you mean Z?)`, or nothing when no known name is close to the given one."""
     close = nearest(given, known)
-    return f" (did you mean {close}?)" if close is not None and close != given else ""
+    return did_you_mean(close if close != given else None)
+
+
+def did_you_mean(name: str | None) -> str:
+    """Return ` (did you mean NAME?)`, the end of a message; nothing without a name."""
+    return f" (did you mean {name}?)" if name else ""

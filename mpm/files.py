@@ -162,7 +162,7 @@ def load_json(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise InputError(f"{path}: not readable as JSON ({error})") from error
     if not isinstance(found, dict):
-        raise InputError(f"{path}: found a {type(found).__name__}; accepted: a JSON object")
+        raise InputError.at(path, "", f"a {type(found).__name__}", "a JSON object")
     return found
 
 

@@ -14,7 +14,7 @@ from mpm.case.keytable import ENTRIES, READ_BY, Key, all_keys, keys_of, toml_nam
 from mpm.case.materials import BUILT_IN
 from mpm.case.schema import for_people
 from mpm.case.sources import mechanism_tables, shared_geometry
-from mpm.errors import InputError, nearest
+from mpm.errors import InputError, did_you_mean, nearest
 from mpm.units import parse
 
 if TYPE_CHECKING:
@@ -87,10 +87,8 @@ def unknown_key(name: str, others: Sequence[str] = ()) -> InputError:
     by_last = {full.rpartition(".")[2]: full for full in reversed(known)}
     close = nearest(name, known) or by_last.get(nearest(name.rpartition(".")[2], by_last) or "")
     tables = ", ".join(key.name for key in keys_of("") if key.is_table)
-    guess = f" (did you mean {close}?)" if close else ""
-    return InputError(
-        f"found {name!r}, no key; accepted: a dotted key such as motion.gamma, or a table: {tables}{guess}"
-    )
+    accepted = f"a dotted key such as motion.gamma, or a table: {tables}{did_you_mean(close)}"
+    return InputError.at(None, "", f"{name!r}, no key", accepted)
 
 
 # Where the values of a case come from
