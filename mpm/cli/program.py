@@ -12,9 +12,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import typer
@@ -24,6 +22,7 @@ from mpm.errors import InputError, Interrupted, MpmError, printable, storage_err
 from mpm.help import missing
 from mpm.launcher import rank
 from mpm.screen import say, screen, spell_out
+from mpm.signals import stop_signals
 
 _PATIENCE = 30.0
 """Seconds that a failing rank waits for the others to fail as well before it ends the whole job."""
@@ -38,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         logging.ERROR
     )  # a read-only home is said by us, where it matters
     words = list(sys.argv[1:] if arguments is None else arguments)
-    with _terminable():
+    with stop_signals(_interrupt, (signal.SIGTERM,)):
         try:
             result = typer.main.get_command(app).main(words, prog_name="mpm", standalone_mode=False)
             if result == Interrupted.exit_status:  # typer makes this of a KeyboardInterrupt
@@ -73,18 +72,9 @@ def _where(error: Any) -> str:
     return "mpm" if error.ctx is None else str(error.ctx.command_path)
 
 
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Let SIGTERM end the program in the same orderly way as Ctrl-C."""
-
-    def interrupt(number: int, frame: FrameType | None) -> NoReturn:
-        raise Interrupted("interrupted")
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+def _interrupt() -> NoReturn:
+    """SIGTERM ends the program in the same orderly way as Ctrl-C."""
+    raise Interrupted("interrupted")
 
 
 def _end(status: int, line: str) -> int:

@@ -10,18 +10,18 @@ import queue
 import shlex
 import signal
 import sys
-import threading
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from mpm.advice.checks import check_case
 from mpm.errors import InputError
 from mpm.files import lock, write_atomically
 from mpm.screen import print_steps, screen
+from mpm.signals import stop_signals
 from mpm.sweep.board import Board, now, say
 from mpm.sweep.cluster import Pool, PoolLost, open_pool
 from mpm.sweep.layout import Layout, read_json
@@ -80,7 +80,7 @@ def run_sweep(
             None, "--output", f"{layout.root}, not empty and no sweep", "a new or a sweep's directory"
         )
     layout.driver.mkdir(parents=True, exist_ok=True)
-    with sole_driver(layout), stop_signals():
+    with sole_driver(layout), stop_signals(_interrupt, (signal.SIGTERM, signal.SIGHUP)):
         earlier = read_json(layout.root / "sweep.json")
         results = Results(sweep, points, layout)
         for sentence in changes(results, earlier):
@@ -108,22 +108,9 @@ def sole_driver(layout: Layout) -> Iterator[None]:
         yield
 
 
-@contextlib.contextmanager
-def stop_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP stop the sweep like Ctrl-C (only the main thread can arrange that)."""
-
-    def interrupt(*_: Any) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def _interrupt() -> NoReturn:
+    """SIGTERM and SIGHUP stop the sweep like Ctrl-C."""
+    raise KeyboardInterrupt
 
 
 def changes(results: Results, earlier: dict[str, Any]) -> list[str]:
