@@ -112,7 +112,19 @@ def test_every_mode_conserves(mode: str, tmp_path: Path) -> None:
         assert result.summary["species"]["Al(OH)3"]["produced"] > 0.0
 
 
-def test_bed_swings_backwards_within_cycles() -> None:
+def shifted_columns(reactor: Reactor, monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """By how many columns the bed moves in each step from now on."""
+    slide, shifts = reactor.system.coverage.slide, list[int]()
+
+    def counted(distance: float) -> int:
+        shifts.append(slide(distance))
+        return shifts[-1]
+
+    monkeypatch.setattr(reactor.system.coverage, "slide", counted)
+    return shifts
+
+
+def test_bed_swings_backwards_within_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails when columns that shift back and forth within each cycle lose their coverage: a swing of 1 mm, narrower columns."""
     changes = {
         **RESOLVED,
@@ -122,22 +134,18 @@ def test_bed_swings_backwards_within_cycles() -> None:
         "motion.bed_velocity": "1 mm/s",
     }
     reactor = Reactor(zone(changes, {**TINY, "geometry.cell_width": "0.7 mm"}), MPI.COMM_SELF)
-    shifts: list[int] = []
-    advance = reactor.system.coverage.slide
-    reactor.system.coverage.slide = lambda distance: (shifts.append(advance(distance)), shifts[-1])[1]  # type: ignore[method-assign]
+    shifts = shifted_columns(reactor, monkeypatch)
     reactor.run(callback=assert_laws)
     assert shifts.count(-1) >= 4 and shifts.count(1) >= 4
 
 
-def test_averaged_bed_does_not_shake() -> None:
+def test_averaged_bed_does_not_shake(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails when the bed of an averaged run follows the vibration, which its steps sample at random: some columns would stay in a cell
     several times as long as their neighbours, and stripes of single columns would cross the coverage. Here one must pass in two steps."""
     case = zone({**SHORT, "time.end": "0.5 s"}, {**TINY, "geometry.cell_width": "0.34 mm"})
     reactor = Reactor(case, MPI.COMM_SELF)
     assert 2.0 * reactor.system.bed_motion.vibration.ax > 0.9 * reactor.grid.dx  # it would shake by a column
-    shifts: list[int] = []
-    advance = reactor.system.coverage.slide
-    reactor.system.coverage.slide = lambda distance: (shifts.append(advance(distance)), shifts[-1])[1]  # type: ignore[method-assign]
+    shifts = shifted_columns(reactor, monkeypatch)
     reactor.run(callback=assert_laws)
     sliding = shifts[reactor.system.schedule.resting_steps :]
     assert len(sliding) > 30 and sliding == [k % 2 for k in range(len(sliding))]

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -21,6 +20,7 @@ from mpm.case.case import load_case
 from mpm.cli import main
 from mpm.cli.nextsteps import how_to_go_on
 from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
+from mpm.reactor.clock import Clock
 from mpm.reactor.progress import Progress, duration
 from mpm.report.tables import print_mesh, print_summary
 from mpm.screen import Listing, screen
@@ -218,13 +218,10 @@ def test_time_to_wait(seconds: float, text: str) -> None:
     assert duration(seconds) == text
 
 
-def test_the_live_line_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_live_line_fits() -> None:
     """Fails when the line of a long run, with its spinner, takes more than 80 columns, or the time left is a row of seconds."""
-    reactor = SimpleNamespace(
-        comm=MPI.COMM_SELF, steps=114_812, time=1234.567, numbers={"balance.TMA": 3.2e-13}, schedule=SimpleNamespace(steps=9_999_999),
-        case=SimpleNamespace(time=SimpleNamespace(end=20000.0)),
-    )  # fmt: skip
-    progress = Progress(reactor, False)  # type: ignore[arg-type]
+    clock = Clock(end=20000.0, all_steps=9_999_999, time=1234.567, steps=114_812, worst_balance=3.2e-13)
+    progress = Progress(clock, MPI.COMM_SELF, False)
     progress.first = (time.monotonic() - 1000.0, 100_000)
     line = progress.line()
     assert line.startswith("1234.6 of 20000 s, step 114812, 14.8 steps/s, 7 d 17 h left, balances to 3e-13")
