@@ -79,7 +79,7 @@ class Gas(Frozen):
         for name, value in default.items():
             in_range(f"gas.diffusivity.{name}", value, "m^2/s")
         values = {**default, **self.diffusivity}
-        self.__dict__["diffusivity"] = {name: values[name] for name in mechanism.species_names}
+        self._fill(diffusivity={name: values[name] for name in mechanism.species_names})
 
     @property
     def molar_density(self) -> float:
@@ -88,7 +88,7 @@ class Gas(Frozen):
 
     @model_validator(mode="after")
     def _fill_in(self) -> Self:
-        model, values, given = CARRIERS.get(self.carrier), self.__dict__, self.model_fields_set
+        model, given = CARRIERS.get(self.carrier), self.model_fields_set
         if model is None and not {"molar_mass", "viscosity"} <= given:
             raise reject(
                 repr(self.carrier),
@@ -98,12 +98,12 @@ class Gas(Frozen):
                 known=list(CARRIERS),
             )
         if "molar_mass" not in given and model is not None:
-            values["molar_mass"] = model.molar_mass
+            self._fill(molar_mass=model.molar_mass)
         if "viscosity" not in given and model is not None:
-            values["viscosity"] = in_range("viscosity", model.viscosity(self.temperature), "Pa s")
+            self._fill(viscosity=in_range("viscosity", model.viscosity(self.temperature), "Pa s"))
         if "density" not in given:
             density = ideal_gas_density(
                 pressure=self.pressure, molar_mass=self.molar_mass, temperature=self.temperature
             )
-            values["density"] = in_range("density", density, "kg/m^3")
+            self._fill(density=in_range("density", density, "kg/m^3"))
         return self

@@ -102,7 +102,7 @@ class Geometry(Frozen):
         if flow > 0.0 and not self.outlets:
             raise reject("inlets but no outlet", "at least one outlet", key="outlet")
         if not self.zones:
-            self.__dict__["zones"] = default_zones(self.inlets, self.length)
+            self._fill(zones=default_zones(self.inlets, self.length))
         check_zones(self.zones, self.inlets, length=self.length, dx=self.dx)
         return self
 

@@ -6,11 +6,12 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, get_args, get_origin
+from typing import Any, get_origin
 
 from pydantic import BaseModel
 
 from mpm.case.materials import BUILT_IN
+from mpm.case.places import tables_in
 from mpm.case.schema import finished, number_text
 from mpm.case.sources import built_in_files
 from mpm.case.tables import CaseTables
@@ -152,32 +153,25 @@ def _keys_of_model(model: type[BaseModel], table: str) -> Iterator[Key]:
     for field_name, field in model.model_fields.items():
         name = field.alias or field_name
         entry, dotted = properties[name], f"{prefix}{name}"
-        inner = _model_in(field.annotation)
-        if inner is None:
+        tables = tables_in(field.annotation)
+        if not tables:
             yield _leaf(dotted, table, entry, field.is_required())
             if name in ENTRIES:
                 yield _entry_of_table(dotted, entry, name)
             continue
         named = get_origin(field.annotation) in (tuple, dict)
-        kind = {tuple: f"a list of tables [[{dotted}]]", dict: f"tables [{dotted}.NAME]"}
+        kind: dict[Any, str] = {tuple: f"a list of tables [[{dotted}]]", dict: f"tables [{dotted}.NAME]"}
         yield Key(
             dotted,
             table,
             entry["description"],
-            kind.get(get_origin(field.annotation), f"a table [{dotted}]"),  # type: ignore[arg-type]
+            kind.get(get_origin(field.annotation), f"a table [{dotted}]"),
             required=field.is_required(),
             worked_out=entry.get("worked_out", ""),
             is_table=True,
             entries=f"{dotted}.<name>" if named else "",
         )
-        yield from _keys_of_model(inner, f"{dotted}.<name>" if named else dotted)
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """The model whose tables a field holds, alone, in a list or by name."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((found for part in get_args(annotation) if (found := _model_in(part)) is not None), None)
+        yield from _keys_of_model(tables[0], f"{dotted}.<name>" if named else dotted)
 
 
 def _leaf(dotted: str, table: str, entry: Mapping[str, Any], required: bool) -> Key:

@@ -144,7 +144,6 @@ class Material(Frozen):
     @model_validator(mode="after")
     def _fill_in(self) -> Self:
         given, d = self.model_fields_set, self.particle_diameter
-        values = self.__dict__
         surface = None if d is None else particle_surface(self.porosity, d, self.sphericity)
         if self.kozeny_constant is not None and surface is not None and "permeability" in given:
             k = kozeny_carman(
@@ -163,11 +162,11 @@ class Material(Frozen):
                     'a permeability, e.g. "4.25 um^2", or a particle_diameter, with which sphericity and kozeny_constant give one',
                     key="permeability",
                 )
-            values["kozeny_constant"] = constant = self.kozeny_constant or PACKED_SPHERES
+            constant = self.kozeny_constant or PACKED_SPHERES
             k = kozeny_carman(porosity=self.porosity, surface_to_volume=surface, constant=constant)
-            values["permeability"] = (in_range("permeability", k, "m^2"),) * 2
+            self._fill(permeability=(in_range("permeability", k, "m^2"),) * 2, kozeny_constant=constant)
         if "tortuosity_factor" not in given:
-            values["tortuosity_factor"] = (self.porosity**-0.5,) * 2
+            self._fill(tortuosity_factor=(self.porosity**-0.5,) * 2)
         if "surface_to_volume" not in given:
             if surface is None:
                 raise reject(
@@ -175,7 +174,7 @@ class Material(Frozen):
                     'a surface per total volume, e.g. "58000 1/m", or a particle_diameter',
                     key="surface_to_volume",
                 )
-            values["surface_to_volume"] = in_range("surface_to_volume", surface, "1/m")
+            self._fill(surface_to_volume=in_range("surface_to_volume", surface, "1/m"))
         if self.initial_coverage and abs(sum(self.initial_coverage.values()) - 1.0) > 1e-9:
             raise reject(
                 f"coverages that sum to {sum(self.initial_coverage.values()):g}",

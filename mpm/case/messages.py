@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import types
-from collections.abc import Iterator, Sequence
-from typing import Any, Union, get_args, get_origin
+from collections.abc import Sequence
+from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from mpm.case.materials import BUILT_IN
+from mpm.case.places import TAG, dotted_keys, field_at, kinds_at, known_keys, tables_in
 from mpm.errors import InputError, nearest
 from mpm.units import Dimension, describe
 
-TAG = "kind"
-"""The key that says which of several kinds a table is."""
 _LATER = {"missing": 1, "too_short": 2}
 """A misspelt key is both unknown and missing: say the former. A list whose entries are all wrong counts as empty: say what is wrong."""
 
@@ -24,7 +22,7 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
     first = min(error.errors(include_url=False), key=lambda e: _LATER.get(e["type"], 0))
     kind, context = first["type"], first.get("ctx") or {}
     location = first["loc"]
-    key = address([part for i, part in enumerate(location) if not _choices(model, location[:i])], data)
+    key = address([part for i, part in enumerate(location) if not kinds_at(model, location[:i])], data)
     if kind == "mpm":
         key = ".".join(part for part in (key, context.get("key", "")) if part)
         if context["found"] == "nothing":
@@ -40,9 +38,9 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
     if kind == "extra_forbidden":
         return _unknown(source, key, str(location[-1]), known_keys(model, location[:-1]), model)
     if kind == "missing":
-        return _missing(source, key, _expected(_field(model, location)), location, data)
+        return _missing(source, key, _expected(field_at(model, location)), location, data)
     if kind.startswith("union_tag"):
-        tags = list(_choices(model, location))
+        tags = list(kinds_at(model, location))
         given = context.get("tag")
         found = "nothing" if given is None else repr(given)
         return InputError.at(source, f"{key}.{TAG}", found, ", ".join(tags), known=tags, given=str(given))
@@ -51,14 +49,14 @@ def to_input_error(error: ValidationError, model: type[BaseModel], data: Any, so
         choices = [choice.strip("'") for choice in context["expected"].replace(" or ", ", ").split(", ")]
         return InputError.at(source, key, found, ", ".join(choices), known=choices, given=str(first["input"]))
     text = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    accepted = _expected(_field(model, location)) if kind == "tuple_type" else _WORDS.get(kind, text)
+    accepted = _expected(field_at(model, location)) if kind == "tuple_type" else _WORDS.get(kind, text)
     return InputError.at(source, key, found, accepted, given="")
 
 
 def _unknown(source: str, key: str, given: str, known: Sequence[str], model: type[BaseModel]) -> InputError:
     """A key is unknown here: misspelt, or the key of another table of the file."""
     accepted = f"one of {', '.join(known)}"
-    elsewhere = [name for name in _all_keys(model) if name.rpartition(".")[2] == given]
+    elsewhere = [name for name in dotted_keys(model) if name.rpartition(".")[2] == given]
     if elsewhere:
         accepted += f"; {given} belongs elsewhere: {', '.join(elsewhere)}"
         return InputError.at(source, key, "an unknown key", accepted, given="")
@@ -134,83 +132,11 @@ def address(location: Sequence[int | str], data: Any) -> str:
     return ".".join(parts)
 
 
-def known_keys(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:
-    """Keys that the table at `location` may have."""
-    table = _model(model, location)
-    return [field.alias or name for name, field in table.model_fields.items()] if table else []
-
-
-def _all_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Every dotted key of a file; an entry of a list or of named tables as <name>."""
-    for name, field in model.model_fields.items():
-        key = prefix + (field.alias or name)
-        yield key
-        named = get_origin(field.annotation) in (tuple, dict)
-        keys = (
-            inner
-            for table in _tables(field.annotation)
-            for inner in _all_keys(table, f"{key}.<name>." if named else f"{key}.")
-        )
-        yield from dict.fromkeys(keys)
-
-
-def _tables(annotation: Any) -> list[type[BaseModel]]:
-    """The models that a field holds: alone, in a list, by name, or one of several."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [table for part in get_args(annotation) for table in _tables(part)]
-
-
-def _type(model: type[BaseModel], location: Sequence[int | str]) -> Any:
-    """The type at `location`, walking through fields, tuples and dictionaries of models, and tables of several kinds."""
-    current: Any = model
-    for part in location:
-        if isinstance(current, type) and issubclass(current, BaseModel):
-            field = _named_field(current, str(part))
-            current = field.annotation if field else None
-        elif choices := _by_tag(current):
-            current = choices.get(str(part))
-        else:
-            current = next((a for a in get_args(current) if a not in (str, Ellipsis, type(None))), None)
-        if get_origin(current) in (Union, types.UnionType) and not _by_tag(current):
-            current = next((a for a in get_args(current) if a is not type(None)), None)
-    return current
-
-
-def _by_tag(annotation: Any) -> dict[str, type[BaseModel]]:
-    """The models of a table of several kinds by their tags; empty for another type."""
-    if get_origin(annotation) not in (Union, types.UnionType) or type(None) in get_args(annotation):
-        return {}
-    return {
-        tag: table for table in _tables(annotation) for tag in get_args(table.model_fields[TAG].annotation)
-    }
-
-
-def _choices(model: type[BaseModel], location: Sequence[int | str]) -> dict[str, type[BaseModel]]:
-    """The kinds of the table at `location`, where there are several: pydantic's next step is then the tag, which is no key."""
-    return _by_tag(_type(model, location))
-
-
-def _model(model: type[BaseModel], location: Sequence[int | str]) -> type[BaseModel] | None:
-    """The model class of the table at `location`."""
-    current = _type(model, location)
-    return current if isinstance(current, type) and issubclass(current, BaseModel) else None
-
-
-def _named_field(model: type[BaseModel], key: str) -> FieldInfo | None:
-    return next((f for name, f in model.model_fields.items() if (f.alias or name) == key), None)
-
-
-def _field(model: type[BaseModel], location: Sequence[int | str]) -> FieldInfo | None:
-    table = _model(model, location[:-1])
-    return _named_field(table, str(location[-1])) if table else None
-
-
 def _expected(field: FieldInfo | None) -> str:
     for item in field.metadata if field else ():
         if isinstance(item, Dimension):
             return item.accepted
-    if field is not None and get_origin(field.annotation) is tuple and _tables(field.annotation):
+    if field is not None and get_origin(field.annotation) is tuple and tables_in(field.annotation):
         return "a list of tables, [[...]]"
     if field is not None and field.annotation is int:
         return "a whole number"

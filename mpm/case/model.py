@@ -14,6 +14,10 @@ class Frozen(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
+    def _fill(self, **values: Any) -> None:
+        """Put in what the file leaves out and other values give; only while a file is read, before anybody has seen the table."""
+        self.__dict__.update(values)
+
 
 def nothing_required(schema: dict[str, Any]) -> None:
     """Schema of a table that may lie over another (a shared geometry, a built-in material, a mechanism) and change one key of it."""

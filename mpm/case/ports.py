@@ -127,11 +127,11 @@ class Inlet(Port):
                     "a stop after the start",
                     key="stop",
                 )
-            self.__dict__["windows"] = ((self.start, self.stop),)
+            self._fill(windows=((self.start, self.stop),))
         elif self.model_fields_set & {"start", "stop"}:
             raise reject("windows beside start or stop", "either start and stop, or windows", key="windows")
         else:
-            self.__dict__.update(start=self.windows[0][0], stop=self.windows[-1][1])
+            self._fill(start=self.windows[0][0], stop=self.windows[-1][1])
         total = sum(self.mass_fractions.values())
         if total > 1.0:
             raise reject(f"mass fractions that sum to {total:g}", "at most 1 in all", key="mass_fractions")

@@ -38,7 +38,7 @@ class Step:
 
 
 def aligned_step(step: float, *, column: float, speed: float) -> float:
-    """The longest step up to `step` [s] that fits the bed's shifts: a whole number of steps per column, or of columns per step.
+    """The longest step up to `step` [s] that is commensurate with the bed's motion: whole steps per column, or whole columns per step.
 
     Every column then meets the gas of a cell for equally long, where otherwise some would stay a step longer than their neighbours.
     A shift takes `column` / `speed` [m, m/s].

@@ -238,8 +238,9 @@ class GasKinetics:
 def _respond(rate: Floats, slopes: Floats, concentration: Floats, g: int, j: int, factor: Floats) -> None:
     """Add to a rate of gas `g` (n,) and its `slopes` (coupled, n) what the coverage's response to C_j brings, factor C_g per unit C_j.
 
-    Where C_j < 0 the rate follows its tangent at zero. Solids at rest that see both precursors turn over at a harmonic mean of the two
-    supplies, which is concave; its tangents keep it so beyond zero, where a rate that ignored C_j would have a kink that stalls Newton.
+    Continued along the tangent: where C_j < 0 the rate follows its slope at zero. Solids at rest that see both precursors turn over at a
+    harmonic mean of the two supplies, which is concave; its tangents keep it so beyond zero, where a rate that ignored C_j would have a
+    kink that stalls Newton.
     """
     own = concentration[g]
     if j == g:

@@ -11,8 +11,6 @@ from collections.abc import Mapping
 
 from mpm.physics.mechanism import Mechanism, SurfaceReaction
 
-Coverage = dict[str, float]
-
 
 def site_speeds(
     mechanism: Mechanism, species: str, site: str, temperature: float
@@ -28,7 +26,7 @@ def site_speeds(
 
 def saturate(
     mechanism: Mechanism, species: str, coverage: Mapping[str, float], temperature: float
-) -> tuple[Coverage, float] | None:
+) -> tuple[dict[str, float], float] | None:
     """Coverage once `species` finds nothing more to react with, and molecules it has taken per site.
 
     Where reactions compete for a site they share it as their speeds are (equally when all are zero). None when sites come back to a state
@@ -54,7 +52,7 @@ def saturate(
 
 def coverage_met(
     mechanism: Mechanism, species: str, fresh: Mapping[str, float], temperature: float
-) -> Coverage | None:
+) -> dict[str, float] | None:
     """Coverage that `species` finds: that of fresh solids, or, where it reacts with none of it, what other precursors make of it.
 
     So TMA meets OH, and water what TMA leaves. None when no order of precursors makes a site that it reacts with.
