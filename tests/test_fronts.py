@@ -50,24 +50,26 @@ def test_front_of_a_ramp(grid: Grid) -> None:
     center, reach, feed = 0.1048, 0.05, 2.0
     behind = np.clip(center - centres(grid), 0.0, None)
     profile = feed * np.clip(1.0 - behind / reach, 0.0, 1.0)
-    found = front(grid, profile, feed, center)
+    found = front(grid, profile, feed=feed, center=center)
     assert found["upstream"] == pytest.approx(0.5 * reach, rel=0.05)
     assert found["upstream_width"] == pytest.approx(0.8 * reach, rel=0.05)
-    assert "downstream" not in front(grid, np.full(grid.columns, feed), feed, center)
-    assert front(grid, 1e-9 * profile, feed, center) == {}  # the far end of a front has no width of its own
+    assert "downstream" not in front(grid, np.full(grid.columns, feed), feed=feed, center=center)
+    assert (
+        front(grid, 1e-9 * profile, feed=feed, center=center) == {}
+    )  # the far end of a front has no width of its own
 
 
 @pytest.mark.parametrize("place", [0.06, 0.12])
 def test_coverage_front_is_signed(grid: Grid, place: float) -> None:
     """Covered solids begin at `place`: upstream of the inlet the distance is positive, downstream negative."""
     profile = np.where(centres(grid) > place, 1.0, 0.0)
-    found = coverage_front(grid, profile, 0.1048, incoming=0.0)
+    found = coverage_front(grid, profile, center=0.1048, incoming=0.0)
     assert found == pytest.approx(0.1048 - place, abs=grid.dx)
 
 
 def test_solids_do_not_come_round_the_seam(grid: Grid) -> None:
     """A bed covered throughout whose solids come in bare has its front at the left end; one that comes in covered has none."""
     covered = np.ones(grid.columns)
-    assert coverage_front(grid, covered, 0.1048, incoming=0.0) == pytest.approx(0.1048, abs=grid.dx)
-    assert coverage_front(grid, covered, 0.1048, incoming=1.0) is None
-    assert coverage_front(grid, 0.0 * covered, 0.1048, incoming=0.0) is None
+    assert coverage_front(grid, covered, center=0.1048, incoming=0.0) == pytest.approx(0.1048, abs=grid.dx)
+    assert coverage_front(grid, covered, center=0.1048, incoming=1.0) is None
+    assert coverage_front(grid, 0.0 * covered, center=0.1048, incoming=0.0) is None

@@ -127,8 +127,13 @@ def test_what_is_missing_or_damaged(run: Path, tmp_path: Path, capsys: pytest.Ca
 
 def test_scale_and_numbers_of_a_bar() -> None:
     """Fails when a strip is drawn flatter than it is or out of the window, or numbers at a bar crowd each other."""
-    assert [vertical_scale(length, 0.02, 2) for length in (0.001, 0.02, 0.14, 2.0)] == [1, 1, 2, 40]
-    assert vertical_scale(0.14, 0.02, 1) == 5
+    assert [vertical_scale(length=length, height=0.02, panels=2) for length in (0.001, 0.02, 0.14, 2.0)] == [
+        1,
+        1,
+        2,
+        40,
+    ]
+    assert vertical_scale(length=0.14, height=0.02, panels=1) == 5
     assert bar_labels(0.0, 1.0, False) == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
     assert bar_labels(0.0, 0.0655, False) == pytest.approx([0.0, 0.02, 0.04, 0.0655])
     assert bar_labels(0.0, 0.04, False) == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.04])

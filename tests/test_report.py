@@ -334,7 +334,9 @@ def test_levels_give_the_values_back(logarithmic: bool) -> None:
 
 def test_times_that_are_alike_are_stored_once() -> None:
     """Fails when a flow that does not change is carried once for every output."""
-    look = Look("pressure", "pressure", "Pa", 1.0, False, "Viridis")
+    look = Look(
+        name="pressure", label="pressure", unit="Pa", factor=1.0, logarithmic=False, colours="Viridis"
+    )
     field = np.arange(12.0).reshape(3, 4)
     assert encode(look, [field, field, 2.0 * field, 2.0 * field]).frames == (0, 0, 1, 1)
 
@@ -578,7 +580,8 @@ def test_pages_fit_a_narrow_window(zone: Path, weaker: Path, cycle: Path, browse
 )
 def test_what_is_even_has_no_rainbow(low: float, high: float, shown: tuple[float, float]) -> None:
     """Fails when the rounding of a field that is the same everywhere gets all the colours."""
-    assert value_range(Look("velocity", "speed", "cm/s", 1.0, False, "Viridis"), low, high) == shown
+    look = Look(name="velocity", label="speed", unit="cm/s", factor=1.0, logarithmic=False, colours="Viridis")
+    assert value_range(look, low, high) == shown
 
 
 def test_a_page_that_finds_no_room_costs_no_run(

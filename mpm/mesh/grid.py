@@ -138,6 +138,11 @@ class Grid:
         return is_open
 
     @property
+    def row_centres(self) -> Floats:
+        """Heights of the rows' centres (rows,) [m]."""
+        return 0.5 * (self.y[1:] + self.y[:-1])
+
+    @property
     def centres(self) -> Floats:
         """Middle of each column [m]."""
         return 0.5 * (self.x[1:] + self.x[:-1])

@@ -228,7 +228,7 @@ class RunDirectory:
             raise InputError(f"{path}: not a checkpoint of mpm (no {META})") from error
         return arrays, meta
 
-    def cut_back(self, rows: int, time: float, cycle: float = math.inf) -> None:
+    def cut_back(self, rows: int, time: float, *, cycle: float = math.inf) -> None:
         """Drop all but the first `rows` output times, those of the restart state at `time` [s]; later output continues the numbering.
 
         Of the phases those from `cycle` [s], where the last cycle begins, up to the restart state stay. Files that the lists do not name

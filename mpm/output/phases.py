@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LastCycle:
     """`count` of the steps `begin` <= index < `end`, the last cycle of whole steps, at equal distances; no steps: nothing is written.
 
@@ -46,8 +46,9 @@ class LastCycle:
         end = schedule.steps - int(schedule.steps > 0 and schedule.step(schedule.steps - 1).cut)
         begin = end - steps
         if count == 0 or steps == 1 or begin < schedule.resting_steps:
-            return cls(0, 0, count, steps, schedule.end)
-        return cls(begin, end, count, steps, schedule.step(begin).t0)
+            begin = end = 0
+        since = schedule.step(begin).t0 if begin < end else schedule.end
+        return cls(begin=begin, end=end, count=count, steps_per_cycle=steps, since=since)
 
     @property
     def empty(self) -> bool:

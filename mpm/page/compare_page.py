@@ -25,16 +25,16 @@ MOST_RUNS = 6
 """Beyond that a sweep says more than runs side by side."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Changed:
     """A line of a table of runs: what it is, a text per run, and how far the others are from the first."""
 
     label: str
-    meaning: str
-    unit: str
     texts: Sequence[str]
-    values: Sequence[float | None]
-    relative: Sequence[str]
+    meaning: str = ""
+    unit: str = ""
+    values: Sequence[float | None] = ()
+    relative: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ def key_table(runs: Sequence[Run]) -> list[Changed]:
                 people[i].get(change.key, raw) or "" for i, raw in ((0, change.first), (place, change.second))
             )
             texts.setdefault(change.key, [first] * len(runs))[place] = second
-    return [Changed(key, "", "", line, (), ()) for key, line in texts.items()]
+    return [Changed(label=key, texts=line) for key, line in texts.items()]
 
 
 def number_table(runs: Sequence[Run]) -> list[Changed]:
@@ -144,7 +144,12 @@ def _number_line(what: Quantity, numbers: Sequence[Mapping[str, float]]) -> Chan
         for value in values[1:]
     ]
     return Changed(
-        what.label, f"{what.meaning} ({what.name})", superscript(what.unit_shown), texts, values, relative
+        label=what.label,
+        meaning=f"{what.meaning} ({what.name})",
+        unit=superscript(what.unit_shown),
+        texts=texts,
+        values=values,
+        relative=relative,
     )
 
 

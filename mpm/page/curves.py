@@ -27,10 +27,10 @@ Chart = dict[str, Any]
 
 def chart(
     title: str,
+    *,
     x: str,
     y: str,
     traces: Sequence[Mapping[str, Any]],
-    *,
     logarithmic: bool = False,
     x_range: Sequence[float] | None = None,
     y_range: Sequence[float] | None = None,
@@ -107,7 +107,11 @@ def coating(run: Run) -> Chart | None:
     if not traces:
         return None
     return chart(
-        "Coverage that each inlet makes", "time [s]", "share of the sites", traces, y_range=[-0.03, 1.05]
+        "Coverage that each inlet makes",
+        x="time [s]",
+        y="share of the sites",
+        traces=traces,
+        y_range=[-0.03, 1.05],
     )
 
 
@@ -133,7 +137,9 @@ def outlets(run: Run) -> Chart | None:
     if not traces:
         return None
     where = f" of {names[0]}" if len(names) == 1 else "s"
-    return chart(f"Gas in the outlet{where}", "time [s]", "mole fraction", traces, logarithmic=True)
+    return chart(
+        f"Gas in the outlet{where}", x="time [s]", y="mole fraction", traces=traces, logarithmic=True
+    )
 
 
 def growth(run: Run) -> Chart | None:
@@ -144,7 +150,11 @@ def growth(run: Run) -> Chart | None:
     what = quantity("cvd.rate_mean")
     traces = [trace(run.history["time"], np.where(v > 0.0, v, np.nan), what.label, 1) for v in found.values()]
     return chart(
-        "Parasitic growth in the gas", "time [s]", f"mean rate [{what.unit_shown}]", traces, logarithmic=True
+        "Parasitic growth in the gas",
+        x="time [s]",
+        y=f"mean rate [{what.unit_shown}]",
+        traces=traces,
+        logarithmic=True,
     )
 
 
@@ -153,7 +163,7 @@ def exit_profiles(run: Run) -> Chart | None:
     rows = _conveyed_rows(run.case, run)
     if rows is None:
         return None
-    y = 0.5 * (run.grid.y[1:] + run.grid.y[:-1])[rows] * MM
+    y = run.grid.row_centres[rows] * MM
     traces = []
     for index, (inlet, entry) in enumerate(run.summary.get("titration", {}).items()):
         profile = entry.get("exit_profile", [])
@@ -162,8 +172,8 @@ def exit_profiles(run: Run) -> Chart | None:
     if not traces:
         return None
     return chart(
-        "Coverage over the height of the bed where it leaves", "share of the sites", "height y [mm] (0: top of the bed)",
-        traces, x_range=[-0.03, 1.05],
+        "Coverage over the height of the bed where it leaves", x="share of the sites",
+        y="height y [mm] (0: top of the bed)", traces=traces, x_range=[-0.03, 1.05],
     )  # fmt: skip
 
 
@@ -208,8 +218,8 @@ def flux(run: Run) -> Chart | None:
     ends = (1.05 * lowest, 1.05 * highest or 1.0)  # from zero: rounding must not look like a profile
     return chart(
         "Gas rising through the faces of the layers",
-        "x [mm]",
-        "superficial velocity [cm/s]",
-        traces,
+        x="x [mm]",
+        y="superficial velocity [cm/s]",
+        traces=traces,
         y_range=ends,
     )

@@ -34,7 +34,7 @@ MOST_TIMES, FEWEST_TIMES = 161, 21
 MOST_JOINED = 16
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Look:
     """How a field is shown: `name` as in the files, label and unit for people, `factor` from SI to that unit, scale and colours."""
 

@@ -22,7 +22,7 @@ from mpm.report.verdict import verdict
 from mpm.screen import HARD_SPACE, Listing, entry
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Input:
     """A value of the case; `origin` is empty where the run does not say."""
 
@@ -117,7 +117,10 @@ def unfinished(run: Run) -> str:
 
 def inputs(run: Run) -> list[tuple[str, list[Input]]]:
     """Every value of the case under a heading, with its meaning and where it came from when the run was started."""
-    found = [Input(v.name, v.text, v.key.description, run.origins.get(v.name, "")) for v in values(run.case)]
+    found = [
+        Input(key=v.name, text=v.text, meaning=v.key.description, origin=run.origins.get(v.name, ""))
+        for v in values(run.case)
+    ]
     groups = [(title, [one for one in found if one.key.startswith(keys)]) for title, keys in TITLES]
     told = {one.key for _, rows in groups for one in rows}
     rest = [one for one in found if one.key not in told]

@@ -27,7 +27,7 @@ MOST_PAGES = 200
 """Pages of single runs that come with a sweep's: each takes a second or two and some megabytes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Axis:
     """What was varied: `values` of all points of the `keys` in the unit that the sweep file writes; words as they are."""
 
@@ -47,7 +47,7 @@ class Axis:
         return ", ".join(texts) if len(texts) <= 12 else f"{texts[0]} to {texts[-1]}, {len(texts)} values"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Column:
     """A number of all points, in the unit that people read; None where a point has no result."""
 
@@ -63,7 +63,7 @@ class Column:
         return len(set(self.values) - {None}) > 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Point:
     """A row of the table: `page` is where its run is shown, relative to the sweep; empty where there is none."""
 
@@ -144,7 +144,15 @@ def _axis(axis: dict[str, Any], cells: Sequence[str]) -> Axis:
         meaning = ""
     name = axis["name"]
     label = name if name.count(".") < 2 else ".".join(name.split(".")[-2:])
-    return Axis(name, axis["keys"], label, unit, meaning, bool(axis["logarithmic"]), values)
+    return Axis(
+        name=name,
+        keys=axis["keys"],
+        label=label,
+        unit=unit,
+        meaning=meaning,
+        logarithmic=bool(axis["logarithmic"]),
+        values=values,
+    )
 
 
 def _tidy(value: float) -> float:
@@ -157,7 +165,9 @@ def _column(name: str, cells: Sequence[str], steady: bool) -> Column:
     values = [
         _clean(float(f"{what.of(float(cell)):.6g}"), what) if _is_number(cell) else None for cell in cells
     ]
-    return Column(name, what.label, superscript(what.unit_shown), what.meaning, values)
+    return Column(
+        name=name, label=what.label, unit=superscript(what.unit_shown), meaning=what.meaning, values=values
+    )
 
 
 def _clean(value: float, what: Quantity) -> float:
@@ -188,7 +198,7 @@ def _points(root: Path, rows: Sequence[dict[str, str]], say: Callable[[str], Non
                 _write(run, page, say)
             written += 1
         where = f"points/{row['point']}/{NAME}" if page.is_file() else ""
-        points.append(Point(row["point"], row["status"], row["error"], where))
+        points.append(Point(name=row["point"], status=row["status"], error=row["error"], page=where))
     if written == MOST_PAGES:
         say(f"{root}: pages of the first {MOST_PAGES} runs; mpm report {root}/points/NAME writes another")
     return points

@@ -40,7 +40,12 @@ def looks(run: Run) -> dict[str, tuple[Look, Maker]]:
     for name in (*sites, *species, "velocity", "pressure", "cvd_rate"):
         what = field_name(name)
         look = Look(
-            name, what.label, what.unit_shown, what.factor, what.scale == "log", what.colours.capitalize()
+            name=name,
+            label=what.label,
+            unit=what.unit_shown,
+            factor=what.factor,
+            logarithmic=what.scale == "log",
+            colours=what.colours.capitalize(),
         )
         found[name] = (look, _porous(name) if what.porous else _speed if name == "velocity" else _cells(name))
     return found
@@ -52,9 +57,7 @@ def _cells(name: str) -> Maker:
 
 def _porous(name: str) -> Maker:
     def make(run: Run, snapshot: Snapshot) -> Floats:
-        solid = np.array([layer.material is not None for layer in run.case.geometry.layers])[
-            run.grid.row_layer
-        ]
+        solid = run.grid.per_row(lambda _: 1.0, gas=0.0) > 0.0
         return np.where(solid[:, None], run.field(snapshot, name), np.nan)
 
     return make
@@ -79,7 +82,7 @@ def stream_maker() -> Maker:
     return make
 
 
-STREAMS = Look("streams", "streamlines", "", 1.0, False, "Greys")
+STREAMS = Look(name="streams", label="streamlines", unit="", factor=1.0, logarithmic=False, colours="Greys")
 
 
 def viewer(

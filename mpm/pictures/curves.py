@@ -182,7 +182,7 @@ def exit_profile_figure(run: Run, snapshots: Sequence[Snapshot]) -> Figure:
     """Coverage over height where solids leave each dosing zone, a curve for each of the snapshots."""
     shown = exits(run)
     rows = run.grid.layer_rows(next(layer.name for layer in run.case.geometry.layers if layer.moving))
-    y = 0.5 * (run.grid.y[1:] + run.grid.y[:-1])[rows] * MM
+    y = run.grid.row_centres[rows] * MM
     columns = min(4, len(shown))
     lines = -(-len(shown) // columns)
     figure = Figure(figsize=(max(6.0, 1.6 + 2.9 * columns), 0.6 + 3.0 * lines), layout="constrained")

@@ -36,8 +36,7 @@ def values_of(run: Run, snapshot: Snapshot, name: str) -> np.ma.MaskedArray:
     found = field_values(snapshot.cell_data, name, run.directory.pvd).reshape(grid.rows, grid.columns)
     if not field_name(name).porous:
         return np.ma.masked_array(found)
-    materials = [layer.material for layer in run.case.geometry.layers]
-    reactive = np.array([m is not None and m.surface_to_volume > 0.0 for m in materials])[grid.row_layer]
+    reactive = grid.per_row(lambda material: material.surface_to_volume, gas=0.0) > 0.0
     return np.ma.masked_where(np.broadcast_to(~reactive[:, None], found.shape), found)
 
 

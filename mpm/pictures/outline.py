@@ -87,10 +87,11 @@ def draw_ports(axes: Axes, case: Case) -> None:
                 colour = "black"
             upwards = (side == "bottom") == isinstance(port, Inlet)
             text = ("\u2191 " if upwards else "\u2193 ") + port.name
-            draw_port(axes, text, port.x0, port.x1, side, colour, line=index % 2 if crowded else 0)
+            line = index % 2 if crowded else 0
+            draw_port(axes, text, x0=port.x0, x1=port.x1, side=side, colour=colour, line=line)
 
 
-def draw_port(axes: Axes, text: str, x0: float, x1: float, side: str, colour: str, line: int) -> None:
+def draw_port(axes: Axes, text: str, *, x0: float, x1: float, side: str, colour: str, line: int) -> None:
     """One port from x0 to x1 [m]; its name stands `line` lines further out."""
     at, way = (0.0, -1) if side == "bottom" else (1.0, 1)
     transform = axes.get_xaxis_transform()

@@ -138,7 +138,7 @@ def shortened(text: str, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
-def vertical_scale(length: float, height: float, panels: int) -> int:
+def vertical_scale(*, length: float, height: float, panels: int) -> int:
     """How many times higher than it is a strip is drawn, so that its layers can be told apart, in each of so many pictures of it."""
     return max(1, int(TALLEST / panels * length / height))
 
@@ -149,7 +149,7 @@ def script(
     """The text of a script."""
     grid, motion = run.grid, run.case.motion
     times = [time for time, _ in series.steps]
-    high = vertical_scale(float(grid.x[-1] - grid.x[0]), float(grid.y[-1] - grid.y[0]), len(panels))
+    high = vertical_scale(length=grid.length, height=float(grid.y[-1] - grid.y[0]), panels=len(panels))
     label = "'t = %.4g s' % time_value"
     if name == VIBRATION:
         phase = f"(time_value - {motion.start!r}) * {360.0 * motion.frequency!r} % 360.0"

@@ -72,7 +72,7 @@ class Writer:
         self.kept = time = course.clock.time
 
         def cut_back() -> tuple[list[Row], int]:
-            directory.cut_back(meta["rows"], time, self.last_cycle.since)
+            directory.cut_back(meta["rows"], time, cycle=self.last_cycle.since)
             return list(directory.table.rows), len(directory.phases.steps)
 
         rows, phases = on_root(self.comm, cut_back)

@@ -38,8 +38,7 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
     layer = conveyed_layer(case)
     if layer is None:
         return {}
-    rows = grid.layer_rows(layer)
-    inside = (state.reactive_rows >= rows.start) & (state.reactive_rows < rows.stop)
+    inside = within(grid, layer, state.reactive_rows)
     heights = grid.dy[state.reactive_rows[inside]]
     result: dict[str, dict[str, Any]] = {}
     for inlet in case.geometry.inlets:
@@ -62,6 +61,12 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
             entry["box_mean"] = float((theta[:, box].mean(axis=1) @ heights) / heights.sum())
         result[inlet.name] = entry
     return result
+
+
+def within(grid: Grid, layer: str, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which of these rows of the grid lie in a layer."""
+    inside = grid.layer_rows(layer)
+    return np.asarray((rows >= inside.start) & (rows < inside.stop))
 
 
 def exit_column(case: Case, grid: Grid, zone: Zone) -> int | None:
@@ -110,8 +115,7 @@ def film(case: Case, grid: Grid, totals: Totals, before: Totals | None) -> dict[
     area = 0.0
     if name is not None:
         layer = next(l for l in case.geometry.layers if l.name == name)
-        inside = grid.layer_rows(name)
-        rows = (totals.reactive_rows >= inside.start) & (totals.reactive_rows < inside.stop)
+        rows = within(grid, name, totals.reactive_rows)
         length = grid.length
         if layer.moving and case.fidelity == "steady":
             length = abs(case.motion.mean_velocity)

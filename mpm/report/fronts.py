@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mpm.mesh.grid import ON_EDGE, Grid
 from mpm.report.balances import FLOOR
-from mpm.report.coating import titrated
+from mpm.report.coating import titrated, within
 from mpm.report.records import State
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def layer_mean(grid: Grid, field: Floats, layer: str) -> Floats:
     return np.asarray(heights @ field[rows] / heights.sum())
 
 
-def front(grid: Grid, profile: Floats, feed: float, center: float, along: int = 1) -> dict[str, float]:
+def front(grid: Grid, profile: Floats, *, feed: float, center: float, along: int = 1) -> dict[str, float]:
     """Fronts of a concentration profile (columns,) around an inlet at `center` [m] that feeds `feed` [mol/m3]; solids go `along` +x or -x.
 
     `upstream`, `downstream`: distance [m] from the inlet's centreline against and along the conveying direction at which the
@@ -102,14 +102,22 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
         made = titrated(case, species, state.theta)
         entry: dict[str, Any] = {}
         for layer in case.geometry.layers:
-            numbers = front(grid, layer_mean(grid, field, layer.name), feed, inlet.center, case.direction)
+            numbers = front(
+                grid,
+                layer_mean(grid, field, layer.name),
+                feed=feed,
+                center=inlet.center,
+                along=case.direction,
+            )
             coverage = _layer_coverage(grid, state, made, layer.name)
             if coverage is not None:
                 incoming = None
                 if layer.moving and case.geometry.bed_inflow == "fresh":
                     fresh = layer.solid.initial_coverage
                     incoming = sum(fresh.get(site, 0.0) for site in case.mechanism.titrated_sites(species))
-                at = coverage_front(grid, coverage, inlet.center, incoming, case.direction)
+                at = coverage_front(
+                    grid, coverage, center=inlet.center, incoming=incoming, along=case.direction
+                )
                 if at is not None:
                     numbers["coverage"] = at
             if numbers:
@@ -123,7 +131,7 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
 
 
 def coverage_front(
-    grid: Grid, profile: Floats, center: float, incoming: float | None = None, along: int = 1
+    grid: Grid, profile: Floats, *, center: float, incoming: float | None = None, along: int = 1
 ) -> float | None:
     """Distance [m] upstream of an inlet's centreline at which a height-averaged coverage (columns,) passes 1/2; solids go `along` +x or -x.
 
@@ -150,8 +158,7 @@ def _half(grid: Grid, profile: Floats, center: float, direction: int, edge: floa
 
 def _layer_coverage(grid: Grid, state: State, theta: Floats, layer: str) -> Floats | None:
     """Height mean of a coverage (reactive rows, columns) over a layer; None when the layer has no reactive surface."""
-    rows = grid.layer_rows(layer)
-    inside = (state.reactive_rows >= rows.start) & (state.reactive_rows < rows.stop)
+    inside = within(grid, layer, state.reactive_rows)
     if not inside.any():
         return None
     heights = grid.dy[state.reactive_rows[inside]]
@@ -161,7 +168,7 @@ def _layer_coverage(grid: Grid, state: State, theta: Floats, layer: str) -> Floa
 def _height(grid: Grid, field: Floats, level: float, inlet: Inlet, along: int) -> float | None:
     """y at which the column above (or below) an inlet's centre crosses `level`, seen from the inlet."""
     column = column_of(grid, inlet.center, along)
-    y = 0.5 * (grid.y[1:] + grid.y[:-1])
+    y = grid.row_centres
     values = field[:, column]
     at = crossing(y, values, level) if inlet.side == "bottom" else crossing(-y[::-1], values[::-1], level)
     return at if at is None or inlet.side == "bottom" else -at

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Any
 
 from mpm import units
@@ -29,6 +29,7 @@ class Quantity:
     unit: str
     meaning: str
     shown: str = ""
+    _: KW_ONLY
     rate: bool = False
     error: bool = False
     again: bool = False
@@ -62,6 +63,7 @@ class Section:
     heading: str
     gives: Callable[[Records], Mapping[str, Any]]
     numbers: tuple[Quantity, ...]
+    _: KW_ONLY
     history: bool = True
     summary: bool = True
     since_output: bool = False

@@ -64,7 +64,7 @@ class Board:
         if self._display is not None:
             self._display.stop()
 
-    def update(self, name: str, status: str, error: str, seconds: float) -> None:
+    def update(self, name: str, *, status: str, error: str, seconds: float) -> None:
         """A point has ended."""
         self.counts[status] += 1
         self.left -= 1

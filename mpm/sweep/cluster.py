@@ -140,7 +140,7 @@ def dask_pool(address: Any, label: str, look: Callable[[], str] | None = None) -
 
     def slots() -> int:
         try:
-            number = sum(client.nthreads().values())
+            number: int = sum(client.nthreads().values())
         except (OSError, TimeoutError) as error:
             raise PoolLost(f"{label} does not answer any more") from error
         waiting.update(number)

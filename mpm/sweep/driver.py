@@ -148,7 +148,12 @@ def tasks_to_run(results: Results, lease: Lease, ranks: int, command: Sequence[s
         if point.name not in tasks:
             write_atomically(layout.case(point.name), point.case.to_toml())
             tasks[point.name] = Task(
-                str(layout.root), point.name, program(), lease.token, ranks, tuple(command)
+                root=str(layout.root),
+                name=point.name,
+                program=program(),
+                lease=lease.token,
+                ranks=ranks,
+                command=tuple(command),
             )
     return list(tasks.values())
 
@@ -258,7 +263,7 @@ class Collector:
         self.results.note(name, record)
         took = float(record.get("seconds", 0.0))
         self.seconds += took
-        board.update(name, self.results.states[name], self.results.errors[name], took)
+        board.update(name, status=self.results.states[name], error=self.results.errors[name], seconds=took)
         if time.monotonic() >= self._next_save:
             self._save()
 

@@ -33,7 +33,8 @@ def _fractions(sweep: Sweep) -> list[list[float]]:
     sampler = qmc.Sobol if sweep.method == "sobol" else qmc.LatinHypercube
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # a number of samples that is no power of two is allowed
-        return sampler(d=len(sweep.axes), rng=sweep.seed).random(sweep.samples).tolist()
+        drawn: list[list[float]] = sampler(d=len(sweep.axes), rng=sweep.seed).random(sweep.samples).tolist()
+    return drawn
 
 
 def combinations(sweep: Sweep) -> list[tuple[Any, ...]]:

@@ -57,7 +57,7 @@ NO_ROOM = 74
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Task:
     """What a worker has to know; small, and made of plain values so that it travels."""
 

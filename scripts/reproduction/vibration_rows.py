@@ -37,7 +37,7 @@ def spread(run: Run) -> dict[str, float]:
     frit = grid.y[grid.layer_rows("frit").start]
 
     def upstream(layer: str, share: float) -> float:
-        return front(grid, layer_mean(grid, c, layer), 2.0 * share * feed(run.case), center).get(
+        return front(grid, layer_mean(grid, c, layer), feed=2.0 * share * feed(run.case), center=center).get(
             "upstream", 0.0
         )
 
@@ -45,7 +45,9 @@ def spread(run: Run) -> dict[str, float]:
         _highest(y, c.max(axis=1), 0.1 * feed(run.case)) - frit,
         upstream("headspace", 0.01),
         upstream("bed", 0.1),
-        front(grid, layer_mean(grid, c, "bed"), feed(run.case), center).get("upstream_width", 0.0),
+        front(grid, layer_mean(grid, c, "bed"), feed=feed(run.case), center=center).get(
+            "upstream_width", 0.0
+        ),
     )
     return dict(zip(ORDERS, values, strict=True))
 

@@ -54,7 +54,9 @@ def bed_front(run: Run, inlet: str, index: int = -1) -> float | None:
     profile = layer_mean(run.grid, run.field(run.snapshot(index), f"theta_{site}"), "bed")
     bed = run.case.geometry.moving_layer
     assert bed is not None and bed.material is not None
-    return coverage_front(run.grid, profile, port.center, bed.material.initial_coverage.get(site, 0.0))
+    return coverage_front(
+        run.grid, profile, center=port.center, incoming=bed.material.initial_coverage.get(site, 0.0)
+    )
 
 
 @row(
