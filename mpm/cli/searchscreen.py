@@ -50,11 +50,11 @@ def print_found(search: Search, directory: Path, console: Console) -> None:
         f"Found in {states(len(search.points))}: the target coverage of {search.target:g} is reached{short} at every exit with",
     )
     for inlet in best.exits:
-        key = f"geometry.inlet.{inlet}."
+        prefix = f"geometry.inlet.{inlet}."
         doses = [
-            f"{k.removeprefix(key)} = {together(f'{v:.4g} {d.unit}'.strip())}"
-            for d in search.doses
-            if (k := d.key).startswith(key) and (v := best.doses[k])
+            f"{dose.key.removeprefix(prefix)} = {together(f'{best.doses[dose.key]:.4g} {dose.unit}'.strip())}"
+            for dose in search.doses
+            if dose.key.startswith(prefix)
         ]
         say(
             console,

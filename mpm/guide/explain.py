@@ -39,7 +39,7 @@ def explain(name: str) -> list[Line]:
     numbers = [quantity(name)] if known(name) else _numbers(name)
     lines: list[Line] = [] if keys or numbers else _built_in(name) or _other(name) or _field(name)
     if not keys and not numbers and not lines:
-        others = [*(number.name for number in QUANTITIES), *(key.name for key in other_keys())]
+        others = [*(reported.name for reported in QUANTITIES), *(key.name for key in other_keys())]
         raise InputError(f"mpm explain: {unknown_key(name, others)}; mpm explain alone lists them all")
     for key in keys:
         lines += [*([_BLANK] if lines else []), *(_table(key) if key.is_table else _key(key))]
@@ -59,8 +59,8 @@ def overview() -> list[Line]:
             lines.append((2, f"{table or 'at the top'}: {', '.join(names)}", 4))
     lines += [_BLANK, (0, "Numbers that a run reports", 4)]
     groups: dict[str, list[str]] = {}
-    for number in QUANTITIES:
-        head, _, rest = number.name.partition(".")
+    for reported in QUANTITIES:
+        head, _, rest = reported.name.partition(".")
         groups.setdefault(head if rest else "of the run", []).append(rest or head)
     lines += [(2, f"{head}: {', '.join(rest)}", 4) for head, rest in groups.items()]
     return [*lines, _BLANK, (0, "Fields of a run", 4), (2, ", ".join(entry.name for entry in FIELDS), 4)]
@@ -191,19 +191,19 @@ def _numbers(name: str) -> list[Quantity]:
     """Reported numbers of a group (`titration`), or with this last part (`exit_mean`)."""
     wanted = name.strip()
     return [
-        number
-        for number in QUANTITIES
-        if wanted and (number.name.startswith(f"{wanted}.") or f".{number.name}".endswith(f".{wanted}"))
+        reported
+        for reported in QUANTITIES
+        if wanted and (reported.name.startswith(f"{wanted}.") or f".{reported.name}".endswith(f".{wanted}"))
     ]
 
 
 def _reported(numbers: list[Quantity]) -> Iterator[Line]:
-    for number in numbers:
-        label = quantity(number.name).label
-        yield 0, f"{number.name}: a number that a run reports", 0
-        yield 2, f"{label}: {quantity(number.name).meaning}", 0
-        unit = {"1": "a ratio", "": "a count"}.get(number.unit, number.unit)
-        shown = f", shown in {number.unit_shown}" if number.shown else ""
-        steady = " (per second in a steady run)" if number.rate else ""
+    for reported in numbers:
+        label = quantity(reported.name).label
+        yield 0, f"{reported.name}: a number that a run reports", 0
+        yield 2, f"{label}: {quantity(reported.name).meaning}", 0
+        unit = {"1": "a ratio", "": "a count"}.get(reported.unit, reported.unit)
+        shown = f", shown in {reported.unit_shown}" if reported.shown else ""
+        steady = " (per second in a steady run)" if reported.rate else ""
         yield 2, f"unit        {unit}{shown}{steady}", _LABEL
     yield 2, f"found in    {_OUTPUT}", _LABEL

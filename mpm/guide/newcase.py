@@ -72,10 +72,10 @@ def new_case(case: Case, folder: Path) -> str:
     while True:
         text = "\n".join([_HEAD, *_Writer(case, found, active, folder).table("", ())]) + "\n"
         again = {
-            v.path: v.written
-            for v in values(build_case(parse_toml(text, "new case"), {}, folder, "new case"))
+            value.path: value.written
+            for value in values(build_case(parse_toml(text, "new case"), {}, folder, "new case"))
         }
-        missing = {v.path for v in found if again.get(v.path) != v.written} - active
+        missing = {value.path for value in found if again.get(value.path) != value.written} - active
         if not missing:
             return text
         active |= missing
@@ -106,39 +106,38 @@ class _Writer:
 
     def entries(self, key: Key, path: Address) -> Iterator[str]:
         """The entries of a list or table of tables: the first with comments, then the others."""
-        names = list(dict.fromkeys(p[len(path)] for p in self.values if p[: len(path)] == path))
+        names = list(dict.fromkeys(place[len(path)] for place in self.below(path)))
         names.sort(key=lambda name: not self.is_active((*path, name)))  # stable: what is active comes first
         if key.name in _EXAMPLES and not any(self.is_active((*path, name)) for name in names):
             names.insert(0, _EXAMPLES[key.name])
         is_list = "[[" in key.kind
-        for place, name in enumerate(names):
+        for index, name in enumerate(names):
             here = (*path, name)
             active = self.is_active(here)
-            if place and not active and key.name not in _FOR_REFERENCE:
+            if index and not active and key.name not in _FOR_REFERENCE:
                 continue
-            if place == 0 and name == _EXAMPLES["material"]:
+            if index == 0 and name == _EXAMPLES["material"]:
                 yield from _comment(_OWN_POWDER, "# ")
-            if place:
+            if index:
                 yield ""
             yield _header(active, f"[[{key.name}]]" if is_list else f"[{key.name}.{toml_name(name)}]")
-            yield from self.table(key.name, here, described=place == 0, shown=place == 0 or not active)
+            yield from self.table(key.name, here, described=index == 0, shown=index == 0 or not active)
 
     def line(self, key: Key, path: Address, described: bool, shown: bool) -> Iterator[str]:
         """One key with its value: active, or behind a #."""
-        below = {p: v for p, v in self.values.items() if p[: len(path)] == path}
+        below = self.below(path)
         active = self.is_active(path)
         if key.last == "name" and path[:1] == ("geometry",):
             text = json.dumps(path[-2])
         elif active or below:
-            text = self.value(
-                key, path, {p: v for p, v in below.items() if not active or p in self.active}, active
-            )
+            said = {place: value for place, value in below.items() if not active or place in self.active}
+            text = self.value(key, path, said, active)
         else:
             text = key.example
         if described:
             yield ""
             yield from _comment(f"{key.description}{_after(key)}", "# ")
-        if active or described or (shown and any(v.origin == "built-in" for v in below.values())):
+        if active or described or (shown and any(value.origin == "built-in" for value in below.values())):
             yield f"{'' if active else '#'}{key.last} = {text or json.dumps('')}"
 
     def value(self, key: Key, path: Address, found: Mapping[Address, Value], exact: bool) -> str:
@@ -149,13 +148,19 @@ class _Writer:
             if key.name == "motion.profile" and is_file(Path(written)):
                 written = os.path.relpath(written, self.folder)
             return toml_text(_for_people(key.unit, written, exact))
-        table = {p[-1]: _for_people(v.key.unit, v.written, exact) for p, v in found.items()}
+        table = {
+            place[-1]: _for_people(value.key.unit, value.written, exact) for place, value in found.items()
+        }
         one_for_all = key.name == "gas.diffusivity" and len(set(table.values())) == 1
         return toml_text(next(iter(table.values())) if one_for_all else table)
 
+    def below(self, path: Address) -> dict[Address, Value]:
+        """This value, or those below this table."""
+        return {place: value for place, value in self.values.items() if place[: len(path)] == path}
+
     def is_active(self, path: Address) -> bool:
         """Whether this value, or one below this table, is part of what the case says."""
-        return any(p[: len(path)] == path for p in self.active)
+        return any(place[: len(path)] == path for place in self.active)
 
 
 def _mechanism(case: Case, folder: Path) -> str:
