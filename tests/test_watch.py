@@ -101,10 +101,10 @@ def test_a_run_that_fails_before_its_first_step_is_no_killed_one(
 ) -> None:
     """Fails when the end of a run without a flow is told as one from outside, or pictures of nothing are offered."""
 
-    def fail(self: Reactor, bar: Any) -> None:
+    def fail(*_: object) -> None:
         raise ConvergenceError("steady flow: not found")
 
-    monkeypatch.setattr(Reactor, "_start", fail)
+    monkeypatch.setattr("mpm.reactor.system.find_flow", fail)
     path = tmp_path / "run"
     with pytest.raises(ConvergenceError):
         Reactor(zone({**SHORT, "fidelity": fidelity}, TINY), MPI.COMM_SELF).run(path)
