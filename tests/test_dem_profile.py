@@ -89,6 +89,8 @@ def test_flight_interval_interpolates_and_wraps() -> None:
     assert found is not None
     liftoff, contact = found
     assert liftoff == pytest.approx(300.0, abs=2.0) and contact == pytest.approx(60.0, abs=2.0)
+    tent = np.maximum(0.0, 30.0 - np.abs(PHASE - 180.5))  # straight between samples: its crossings are exact
+    assert analysis.flight_interval(PHASE, tent, 12.3) == pytest.approx((162.8, 198.2), abs=1e-9)
     assert analysis.flight_interval(PHASE, np.zeros(N), 0.01) is None
     assert analysis.flight_interval(PHASE, np.ones(N), 0.01) is None
 
@@ -125,6 +127,15 @@ def test_self_diffusivity_of_a_random_walk() -> None:
         diffusivity = analysis.self_diffusivity({"cycle_end": walk}, 0, period, lag)
         assert np.diag(diffusivity) == pytest.approx(sigma**2 / (2 * period), rel=0.03)
     assert abs(diffusivity[0, 2]) < 0.03 * math.sqrt(diffusivity[0, 0] * diffusivity[2, 2])
+
+
+def test_self_diffusivity_counts_cycles() -> None:
+    """Fails when the lag is another number of cycles: two particles at +-v have D = v^2 lag/2, over four cycles at most of those kept."""
+    speed, period = 1e-3, 1 / 16
+    ends = np.arange(6)[:, None, None] * period * speed * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    for lag, cycles in ((1, 1), (3, 3), (4, 4), (5, 4), (9, 4)):
+        found = analysis.self_diffusivity({"cycle_end": ends}, 1, period, lag)
+        assert found[0, 0] == pytest.approx(speed**2 * cycles * period / 2.0) and np.count_nonzero(found) == 1
 
 
 def test_residence_times_and_cycle_velocity() -> None:

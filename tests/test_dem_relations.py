@@ -198,10 +198,18 @@ def test_bond_numbers_are_those_of_the_base_that_is_simulated() -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [{"box.length": 1e9}, {"box.height": 1e20}, {"box.base": "frit", "box.frit_diameter": "1 nm"}]
+    ("change", "held"),
+    [
+        ({"box.length": 1e9}, "on 0 glued"),
+        ({"box.height": 1e20}, "on 0 glued"),
+        (
+            {"box.base": "frit", "box.frit_diameter": "1 nm"},
+            r"on 1.9e\+11 glued",
+        ),  # 12 x 5 times (56 um/1 nm)^2
+    ],
 )
-def test_a_box_that_no_memory_holds_is_refused(change: Any) -> None:
-    """Fails when a slip of a unit fills the memory instead of being named."""
+def test_a_box_that_no_memory_holds_is_refused(change: Any, held: str) -> None:
+    """Fails when a slip of a unit fills the memory instead of being named, or the count is not that of the spheres."""
     case = {"powder": "GL56", "waveform": {"kind": "sine", "gamma": 0.3, "frequency": "16 Hz"}}
-    with pytest.raises(InputError, match=r"box: found a box of about .* up to 5,000,000"):
+    with pytest.raises(InputError, match=rf"box: found a box of about .* {held} .* up to 5,000,000"):
         load_case(case, change)

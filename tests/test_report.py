@@ -36,6 +36,7 @@ from mpm.page.strip import LETTER, drawing
 from mpm.page.sweep_page import sweep_page
 from mpm.report.trees import flatten
 from mpm.report.verdict import verdict
+from mpm.sweep.layout import Layout
 from tests.cases import COARSE, SHORT, TINY
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -495,6 +496,19 @@ def test_a_sweep_of_one_point_shows_its_numbers(tmp_path: Path) -> None:
     assert page.counts == "1 point: 1 done" and [column.values for column in page.columns] == [[0.5]]
 
 
+def test_amounts_of_a_steady_sweep_are_rates(tmp_path: Path) -> None:
+    """Fails when what is fed per second in steady states is shown on the page of a sweep as an amount."""
+    folder = sweep_folder(tmp_path, [(1e-4, 0.01, 0.5, "done", "")])
+    for file in ("sweep.json", "results.csv"):
+        text = (folder / file).read_text()
+        (folder / file).write_text(text.replace("titration.tma.exit_mean", "species.TMA.fed"))
+    assert [column.unit for column in sweep_page(folder).columns] == ["umol/m"]
+    run = Layout(folder).run("p0")
+    run.mkdir(parents=True)
+    (run / "summary.json").write_text(json.dumps({"fidelity": "steady"}))
+    assert [column.unit for column in sweep_page(folder).columns] == ["umol/m/s"]
+
+
 def test_a_run_without_a_field_does_not_widen_the_range_of_the_others(zone: Path, tmp_path: Path) -> None:
     """Fails when a run that is fed nothing stretches the colour range to 1, or its zero is taken for a missing field."""
     changes = {**COARSE, **SHORT, "geometry.inlet.tma.mass_fractions.TMA": 0.0}
@@ -531,8 +545,11 @@ def test_the_verdict_counts_inlets_together(cycle: Path) -> None:
     """Fails when four zones of one precursor take four sentences, a trace is printed with digits, or nothing coated goes unsaid."""
     case = load_run(cycle).case
     twice = {"tma": {"exit_mean": 0.5, "exit_min": 0.25}, "water": {"exit_mean": 1e-9}}
-    said = verdict(case, {"titration": twice, "status": "done", "simulated_seconds": 2.0})
+    ended = {"titration": twice, "status": "done", "simulated_seconds": 2.0}
+    said = verdict(case, ended)
     assert "zone of tma with 50 % of its sites turned into OAl(CH3)2 (worst row 25 %); " in said
+    said_of_use = verdict(case, {**ended, "utilisation": {"tma": 0.625}})
+    assert "(worst row 25 %), where 62.5 % of the TMA fed was used; " in said_of_use
     assert "zone of water with less than 0.001 % of its sites turned into OH; " in said
     changes = {f"geometry.inlet.purge{i}.mass_fractions.TMA": 1e-3 for i in (1, 2)}
     both = {"purge1": twice["tma"], "purge2": {"exit_mean": 0.75, "exit_min": 0.5}}

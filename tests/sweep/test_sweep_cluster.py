@@ -244,6 +244,12 @@ def test_what_a_waiting_sweep_waits_for_is_said_once(
         waiting.update(0)
     waiting.update(1)
     assert capsys.readouterr().err.count("job 7 is PENDING (QOSMaxJobsPerUserLimit)") == 1
+    monkeypatch.setattr(cluster, "QUEUE_SECONDS", 60.0)
+    waiting.update(1)
+    waiting.update(0)  # a worker was there a moment ago
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(cluster, "QUEUE_SECONDS", 0.0)
+    waiting.update(1)
     answer("echo 'slurm_load_jobs error: Unable to contact slurm controller' >&2; exit 1")
     waiting.update(0)
     assert "squeue does not tell" in capsys.readouterr().err
