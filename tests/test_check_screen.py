@@ -1,6 +1,7 @@
 """What `mpm check` says of a case: values with units and origins, what is silent otherwise, each thing once."""
 
 import json
+import re
 import shlex
 import tomllib
 from pathlib import Path
@@ -93,6 +94,22 @@ def test_what_is_silent_is_said() -> None:
     assert "solids come in" not in still
     fixed = load_case("single_zone", {"geometry.layer.bed.moving": False})
     assert "no layer moves" in notes(fixed)[0] and "geometry.layer.bed.moving" in notes(fixed)[0]
+
+
+def test_the_numbers_of_an_engineer_are_those_of_the_report() -> None:
+    """Fails when a number on the screen is not that of the report in the unit beside it."""
+    case = load_case("single_zone")
+    report, text = check_case(case), words(case)
+    bed, tma = report["bed"], report["inlets"]["tma"]
+    for label, value, unit in (
+        ("time of the bed in the strip", bed["residence_time"], " s"),
+        ("gas rising through the bed, at most", bed["gas_velocity"] * 1e2, " cm/s"),
+        ("minimum fluidisation, Wen and Yu", bed["minimum_fluidisation_wen_yu"] * 1e2, " cm/s"),
+        ("pressure drop of the bed", bed["pressure_drop"], " Pa"),
+        ("dose", tma["excess_number"], " molecules per passing site"),
+    ):
+        shown = re.search(rf" {label} (\S+){unit}", text)
+        assert shown is not None and float(shown[1]) == pytest.approx(value, rel=2e-3), label
 
 
 def test_the_hundredth_and_the_standard_flow() -> None:
