@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from mpm.case.profile import read_profile
-from mpm.dem import analysis
+from mpm.dem import analysis, summary
 from mpm.dem.base import FLAT, frit_monolayer, loose_filling, sawtooth_baffle, tooth_area
 from mpm.dem.case import load_case
 from mpm.dem.gas import GasDrag, slab_solids
+from mpm.dem.liftoff import acceleration_liftoff, flight_interval
 from mpm.dem.powder import POWDERS
 from mpm.dem.profile import Profile, conditions, piecewise_fit, scaled_to_mean
 from mpm.dem.waveform import Sawtooth, sine
@@ -85,35 +86,33 @@ def test_a_profile_says_what_it_was_made_with(tmp_path: Path) -> None:
 def test_flight_interval_interpolates_and_wraps() -> None:
     """A gap open from 300 over 360 to 60 degrees is one interval; ripples elsewhere do not count."""
     gap = np.maximum(0.0, np.cos(np.radians(PHASE)) - 0.5) + 1e-3 * np.sin(np.radians(7 * PHASE))
-    found = analysis.flight_interval(PHASE, gap, 0.01)
+    found = flight_interval(PHASE, gap, 0.01)
     assert found is not None
     liftoff, contact = found
     assert liftoff == pytest.approx(300.0, abs=2.0) and contact == pytest.approx(60.0, abs=2.0)
     tent = np.maximum(0.0, 30.0 - np.abs(PHASE - 180.5))  # straight between samples: its crossings are exact
-    assert analysis.flight_interval(PHASE, tent, 12.3) == pytest.approx((162.8, 198.2), abs=1e-9)
-    assert analysis.flight_interval(PHASE, np.zeros(N), 0.01) is None
-    assert analysis.flight_interval(PHASE, np.ones(N), 0.01) is None
+    assert flight_interval(PHASE, tent, 12.3) == pytest.approx((162.8, 198.2), abs=1e-9)
+    assert flight_interval(PHASE, np.zeros(N), 0.01) is None
+    assert flight_interval(PHASE, np.ones(N), 0.01) is None
 
 
 def test_acceleration_criterion() -> None:
     """Bed on the base until 100 degrees, then at constant speed: found there to a few samples, with the delay."""
-    found = analysis.acceleration_liftoff(ideal_curve(100.0, 350.0, BASE[0, 36]), BASE, 1 / 16)
+    found = acceleration_liftoff(ideal_curve(100.0, 350.0, BASE[0, 36]), BASE, 1 / 16)
     assert found is not None
     phase, delay = found
     assert phase == pytest.approx(100.0, abs=9.0)
     assert delay == pytest.approx(phase / 360.0 / 16.0, abs=1e-9)
-    assert analysis.acceleration_liftoff(Profile(PHASE, BASE, np.ones(N)), BASE, 1 / 16) is None
+    assert acceleration_liftoff(Profile(PHASE, BASE, np.ones(N)), BASE, 1 / 16) is None
     assert (
-        analysis.acceleration_liftoff(
-            Profile(PHASE, 0.3 * np.roll(BASE, 20, axis=1), np.ones(N)), BASE, 1 / 16
-        )
+        acceleration_liftoff(Profile(PHASE, 0.3 * np.roll(BASE, 20, axis=1), np.ones(N)), BASE, 1 / 16)
         is None
     )
 
 
 def test_phases_begin_at_zero() -> None:
     """Samples at interval ends numbered by their time: row and column must recover cycle and phase."""
-    time = np.arange(1, 25)  # three cycles of eight samples, the first at 1/8 of a cycle
+    time = np.arange(1.0, 25.0)  # three cycles of eight samples, the first at 1/8 of a cycle
     assert (analysis.over_phase(time, 8, 1) == np.array([np.arange(8, 16), np.arange(16, 24)])).all()
     assert (analysis.over_phase(time, 8, 0)[0] == np.array([8, 1, 2, 3, 4, 5, 6, 7])).all()
 
@@ -124,7 +123,7 @@ def test_self_diffusivity_of_a_random_walk() -> None:
     sigma, period = np.array([2e-6, 1e-6, 0.5e-6]), 1 / 16
     walk = np.cumsum(rng.normal(0, 1, (41, 3000, 3)) * sigma, axis=0) + np.arange(41)[:, None, None] * 1e-4
     for lag in (1, 8):
-        diffusivity = analysis.self_diffusivity({"cycle_end": walk}, 0, period, lag)
+        diffusivity = summary.self_diffusivity({"cycle_end": walk}, 0, period, lag)
         assert np.diag(diffusivity) == pytest.approx(sigma**2 / (2 * period), rel=0.03)
     assert abs(diffusivity[0, 2]) < 0.03 * math.sqrt(diffusivity[0, 0] * diffusivity[2, 2])
 
@@ -134,7 +133,7 @@ def test_self_diffusivity_counts_cycles() -> None:
     speed, period = 1e-3, 1 / 16
     ends = np.arange(6)[:, None, None] * period * speed * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
     for lag, cycles in ((1, 1), (3, 3), (4, 4), (5, 4), (9, 4)):
-        found = analysis.self_diffusivity({"cycle_end": ends}, 1, period, lag)
+        found = summary.self_diffusivity({"cycle_end": ends}, 1, period, lag)
         assert found[0, 0] == pytest.approx(speed**2 * cycles * period / 2.0) and np.count_nonzero(found) == 1
 
 

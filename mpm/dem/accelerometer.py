@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
+from mpm.arrays import Floats
 from mpm.errors import InputError
 from mpm.files import read_text
 
@@ -37,8 +38,8 @@ class Fit:
 class Record:
     """Accelerations [m/s2] (2, n) without their mean, at times t [s] (n,), rows (along the conveyor, vertical)."""
 
-    t: np.ndarray
-    acceleration: np.ndarray
+    t: Floats
+    acceleration: Floats
 
 
 def read_record(path: Path, unit: str = "m/s^2") -> Record:
@@ -75,7 +76,7 @@ def read_record(path: Path, unit: str = "m/s^2") -> Record:
     return Record(t, scale * (data[:, 1:] - data[:, 1:].mean(axis=0)).T)
 
 
-def _columns(path: Path, lines: Sequence[str]) -> tuple[list[str], np.ndarray]:
+def _columns(path: Path, lines: Sequence[str]) -> tuple[list[str], Floats]:
     """The cells of the last header line (none: empty) and the first three columns as numbers (n, 3)."""
     kept = [
         (i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
@@ -131,21 +132,21 @@ def _said_unit(header: Sequence[str]) -> str | None:
     return None if found is None else "g" if found[1] == "g" else "m/s^2"
 
 
-def resample(t: np.ndarray, signal: np.ndarray) -> tuple[float, np.ndarray]:
+def resample(t: Floats, signal: Floats) -> tuple[float, Floats]:
     """Constant interval and the signal on it, 2^n points not fewer than the samples (linear interpolation)."""
     n = 1 << int(np.ceil(np.log2(t.size)))
     even = np.linspace(t[0], t[-1], n)
     return float(even[1] - even[0]), np.interp(even, t, signal)
 
 
-def spectrum(interval: float, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def spectrum(interval: float, signal: Floats) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and single-sided amplitudes of a Hann-windowed FFT."""
     window = np.hanning(signal.size)
     amplitude = 2.0 * np.abs(np.fft.rfft(signal * window)) / window.sum()
     return np.fft.rfftfreq(signal.size, interval), amplitude
 
 
-def largest_peaks(frequency: np.ndarray, amplitude: np.ndarray, count: int) -> list[tuple[float, float]]:
+def largest_peaks(frequency: Floats, amplitude: Floats, count: int) -> list[tuple[float, float]]:
     """The `count` largest local maxima (frequency, amplitude), at least three bins apart and above bin 2."""
     inner = np.arange(2, amplitude.size - 1)
     peaks = inner[(amplitude[inner] >= amplitude[inner - 1]) & (amplitude[inner] > amplitude[inner + 1])]
@@ -158,7 +159,7 @@ def largest_peaks(frequency: np.ndarray, amplitude: np.ndarray, count: int) -> l
     return [(float(frequency[k]), float(amplitude[k])) for k in chosen]
 
 
-def fit_channel(t: np.ndarray, signal: np.ndarray, count: int) -> Fit:
+def fit_channel(t: Floats, signal: Floats, count: int) -> Fit:
     """The `count` largest harmonics: FFT peaks, then frequency, amplitude and phase by least squares.
 
     The fit uses the original, unevenly spaced samples, so neither the resampling nor the leakage of the FFT
@@ -171,7 +172,7 @@ def fit_channel(t: np.ndarray, signal: np.ndarray, count: int) -> Fit:
     start = np.array([f for f, _ in peaks])
     width = 1.0 / (t[-1] - t[0])
 
-    def project(frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def project(frequencies: Floats) -> tuple[Floats, Floats]:
         arg = 2.0 * np.pi * np.outer(t, frequencies)
         basis = np.hstack([np.cos(arg), np.sin(arg)])
         solution = np.linalg.lstsq(basis, signal, rcond=None)[0]

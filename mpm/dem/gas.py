@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mpm.arrays import Floats
 from mpm.physics.fluidisation import gidaspow_beta
 
 from .powder import Powder
@@ -21,7 +22,7 @@ from .powder import Powder
 SLAB = 2.5  # height of a slab in mean diameters, the seed's grid of the gas
 
 
-def slab_solids(height: np.ndarray, diameter: np.ndarray, edges: np.ndarray) -> np.ndarray:
+def slab_solids(height: Floats, diameter: Floats, edges: Floats) -> Floats:
     """Volume of the spheres (centres at `height`) between consecutive edges [m3], shape (len(edges) - 1,).
 
     The part of a sphere below a level at the fraction t of its diameter is t^2 (3 - 2 t).
@@ -48,18 +49,19 @@ class GasDrag:
         """Volume flux normal to the base in the conveyor's frame [m/s]."""
         return self.velocity - base_velocity if self.rests_in_lab else self.velocity
 
-    def edges(self, top: float) -> np.ndarray:
+    def edges(self, top: float) -> Floats:
         """Edges of the slabs from the base to at least `top` [m]."""
-        return np.arange(0, int(top / (SLAB * self.powder.diameter)) + 2) * SLAB * self.powder.diameter
+        count = int(top / (SLAB * self.powder.diameter)) + 2
+        return np.arange(count, dtype=float) * SLAB * self.powder.diameter
 
     def coefficients(
         self,
-        height: np.ndarray,
-        relative: np.ndarray,
-        diameter: np.ndarray,
-        edges: np.ndarray,
-        solid: np.ndarray,
-    ) -> np.ndarray:
+        height: Floats,
+        relative: Floats,
+        diameter: Floats,
+        edges: Floats,
+        solid: Floats,
+    ) -> Floats:
         """gamma of f = gamma (j - u_z) for each particle [kg/s], shape (n,).
 
         `solid`: solid fraction of the slabs, interpolated linearly between their centres; `relative` = j - u_z

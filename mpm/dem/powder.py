@@ -6,6 +6,7 @@ from statistics import NormalDist
 
 import numpy as np
 
+from mpm.arrays import Floats
 from mpm.physics.fluidisation import ERGUN
 
 from ..constants import GRAVITY
@@ -51,7 +52,7 @@ class Powder:
         """Weight of a sphere of the mean diameter [N]."""
         return self.mass * GRAVITY
 
-    def size_classes(self, count: int) -> np.ndarray:
+    def size_classes(self, count: int) -> Floats:
         """Diameters [m] of `count` equally frequent classes of the normal size distribution, shape (count,).
 
         Each is the mean of its quantile interval, stretched so that the standard deviation of the classes is
@@ -67,13 +68,13 @@ class Powder:
         return (1.0 - SMALLEST) * self.diameter / float(class_scores(count).max()) if count > 1 else math.inf
 
 
-def class_scores(count: int) -> np.ndarray:
+def class_scores(count: int) -> Floats:
     """Sizes of `count` > 1 equally frequent classes of a standard normal distribution: mean 0, standard deviation 1."""
     normal = NormalDist()
     # Mean of a standard normal between two quantiles: count * (pdf(lower) - pdf(upper)).
     edges = [0.0, *(normal.pdf(normal.inv_cdf(i / count)) for i in range(1, count)), 0.0]
-    score = count * (np.array(edges[:-1]) - np.array(edges[1:]))
-    return score / score.std()
+    score: Floats = count * (np.array(edges[:-1]) - np.array(edges[1:]))
+    return score / float(score.std())
 
 
 _GLASS = (

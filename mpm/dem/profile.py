@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mpm.arrays import Floats
 from mpm.case.profile import COLUMNS, Conditions
 from mpm.files import write_atomically
 
@@ -24,9 +25,9 @@ class Profile:
     Phase 0: the reactor passes its mean position upwards.
     """
 
-    phase: np.ndarray
-    velocity: np.ndarray
-    contact: np.ndarray
+    phase: Floats
+    velocity: Floats
+    contact: Floats
 
     @property
     def mean(self) -> float:
@@ -70,12 +71,12 @@ class PiecewiseFit:
 
     liftoff: float
     contact: float
-    flight: np.ndarray
+    flight: Floats
     rms: float
     profile: Profile
 
 
-def piecewise_fit(curve: Profile, base: np.ndarray) -> PiecewiseFit:
+def piecewise_fit(curve: Profile, base: Floats) -> PiecewiseFit:
     """Least-squares fit of lift-off phase, contact phase and flight velocity to u_x of the curve.
 
     `base` (2, n): velocity of the base at the same phases. All pairs of phases are tried (prefix sums make that
@@ -98,7 +99,7 @@ def piecewise_fit(curve: Profile, base: np.ndarray) -> PiecewiseFit:
     return _piecewise(curve, base, int(i), int(j) + 1, None)
 
 
-def _piecewise(curve: Profile, base: np.ndarray, start: int, length: int, mean: float | None) -> PiecewiseFit:
+def _piecewise(curve: Profile, base: Floats, start: int, length: int, mean: float | None) -> PiecewiseFit:
     n = len(curve.phase)
     flying = (np.arange(n) - start) % n < length
     flight = np.array([curve.velocity[0, flying].mean(), -base[1, ~flying].sum() / length])
@@ -115,7 +116,7 @@ def _piecewise(curve: Profile, base: np.ndarray, start: int, length: int, mean: 
     return PiecewiseFit(liftoff, contact, flight, rms, profile)
 
 
-def scaled_to_mean(fit: PiecewiseFit, curve: Profile, base: np.ndarray, mean: float) -> PiecewiseFit:
+def scaled_to_mean(fit: PiecewiseFit, curve: Profile, base: Floats, mean: float) -> PiecewiseFit:
     """The same phases with the flight velocity that gives the cycle mean `mean` [m/s]."""
     step = 360.0 / len(curve.phase)
     start = round(fit.liftoff / step + 0.5) % len(curve.phase)

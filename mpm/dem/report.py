@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from mpm.arrays import Floats
 from mpm.errors import printable
 from mpm.files import write_atomically, write_picture
 from mpm.labels import literal
@@ -77,7 +78,7 @@ def write_tables(directory: Path, case: DemCase, results: Results, waveform: Wav
     _csv(directory / "residence_times.csv", "time_s,share_of_particles", np.column_stack([times, share]))
 
 
-def _csv(path: Path, header: str, rows: np.ndarray) -> None:
+def _csv(path: Path, header: str, rows: Floats) -> None:
     lines = [header, *(",".join(f"{value:.6g}" for value in row) for row in rows)]
     write_atomically(path, "\n".join(lines) + "\n")
 
@@ -199,7 +200,7 @@ def _bed(spec: BoxSpec, particles: Particles) -> Figure:
     radius = spec.diameters[particles.classes] / 2.0
     from matplotlib.collections import EllipseCollection
 
-    def spheres(x: np.ndarray, z: np.ndarray, size: np.ndarray | float, **style: Any) -> EllipseCollection:
+    def spheres(x: Floats, z: Floats, size: Floats | float, **style: Any) -> EllipseCollection:
         width = np.broadcast_to(1e3 * np.asarray(size), x.shape)
         offsets = np.column_stack([1e3 * x, 1e3 * z])
         return EllipseCollection(
@@ -235,9 +236,9 @@ def _bed(spec: BoxSpec, particles: Particles) -> Figure:
 
 def draw_waveform(
     path: Path,
-    record: tuple[np.ndarray, np.ndarray],
+    record: tuple[Floats, Floats],
     fit: HarmonicWaveform,
-    spectra: list[tuple[np.ndarray, np.ndarray]],
+    spectra: list[tuple[Floats, Floats]],
 ) -> None:
     """Four cycles of accelerometer data with the fitted harmonics, the spectra, and the displacements.
 

@@ -12,19 +12,23 @@ from contextlib import ExitStack
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from mpm.errors import ConvergenceError, InputError, Interrupted, storage_error
 from mpm.files import lock, write_atomically
 
-from .analysis import Arrays, analyse
+from .analysis import analyse
 from .box import load_lammps
 from .case import DemCase, load_case
 from .report import draw, write_summary, write_tables
 from .screen import Report, cycles_done, silent
 from .simulate import Simulation, stored_particles
+from .summary import summarise
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
 
 LOCK = "lock"  # the file in a directory that says that a run is at work
 
@@ -99,7 +103,7 @@ def run_case(
 def finish(case: DemCase, directory: Path, seconds: float, workers: int) -> dict[str, Any]:
     """Analyse what the seeds left and write profile.csv, summary.json, tables and pictures."""
     simulations = [Simulation(case, seed, seed_directory(directory, seed)) for seed in case.run.seeds]
-    records: list[Arrays] = [s.load_arrays() for s in simulations]
+    records = [s.load_arrays() for s in simulations]
     masses = [s.spec.masses()[s.filling.classes] for s in simulations]
     results = analyse(case, simulations[0].spec, masses, records)
     first = simulations[0]
@@ -123,7 +127,7 @@ def finish(case: DemCase, directory: Path, seconds: float, workers: int) -> dict
             "timestep": first.timestep,
             "steps_per_cycle": first.steps * case.run.updates_per_cycle,
         },
-        **results.summary,
+        **summarise(case, first.spec, results, records),
         "wall_seconds": seconds,
         "workers": workers,
         "versions": {name: version(name) for name in ("mpm", "lammps", "numpy", "scipy")},
@@ -239,7 +243,7 @@ def _side_by_side(case: DemCase, directory: Path, jobs: int, resume: bool, repor
             process.join()
 
 
-def _over_ranks(case: DemCase, directory: Path, resume: bool, report: Report, world: Any) -> None:
+def _over_ranks(case: DemCase, directory: Path, resume: bool, report: Report, world: "Intracomm") -> None:
     """Groups of ranks, each with its share of the seeds; a failure in one is raised by all."""
     seeds = case.run.seeds
     groups = min(len(seeds), world.size)

@@ -1,15 +1,20 @@
 """What is recorded while a box runs: bulk velocity, gap, contacts, voidage and velocity over height, trajectories."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 
 from .gas import slab_solids
 from .spec import BoxSpec, Particles
 
+Arrays = dict[str, Floats]
+"""What a `Recorder` holds of one seed, by name."""
 BIN = 0.5  # height of a bin of the maps, in mean diameters
 COLLAPSED = (
     0.2  # overlap over contact distance that no spring of a bed explains: beds that land reach 0.05 at 3 N/m
@@ -17,7 +22,7 @@ COLLAPSED = (
 GAP_RANKS = (0.05, 0.20)  # ranks in height of the particles whose rise measures the gap
 
 
-def wrapped(position: np.ndarray, size: np.ndarray) -> np.ndarray:
+def wrapped(position: Floats, size: Floats) -> Floats:
     """`position` (n, 3) with x and y in [0, size), size (2,).
 
     The remainder of a small negative number rounds to the size of the box itself, which the periodic search refuses:
@@ -50,7 +55,7 @@ def count_contacts(spec: BoxSpec, particles: Particles) -> tuple[int, int, float
     return int(touching), int(on_base.sum()), worst
 
 
-def _touch(a: np.ndarray, b: np.ndarray, contact: np.ndarray, size: np.ndarray) -> tuple[int, float]:
+def _touch(a: Floats, b: Floats, contact: Floats, size: Floats) -> tuple[int, float]:
     offset = a - b
     offset[:, :2] -= size * np.round(offset[:, :2] / size)
     overlap = 1.0 - np.linalg.norm(offset, axis=1) / contact
@@ -60,13 +65,13 @@ def _touch(a: np.ndarray, b: np.ndarray, contact: np.ndarray, size: np.ndarray) 
 class Recorder:
     """Collects samples of one seed; lives on rank 0. All arrays grow along their first axis, in time."""
 
-    def __init__(self, spec: BoxSpec, velocity_limit: float, base_velocity: Callable[[float], np.ndarray]):
+    def __init__(self, spec: BoxSpec, velocity_limit: float, base_velocity: Callable[[float], Floats]):
         self.spec = spec
         self.limit = velocity_limit
         self.base_velocity = base_velocity
         d = spec.powder.diameter
         self.edges = np.arange(0.0, spec.height + BIN * d, BIN * d)
-        self.data: dict[str, list[np.ndarray | float]] = {
+        self.data: dict[str, list[Floats | float]] = {
             name: []
             for name in (
                 "velocity",
@@ -80,11 +85,11 @@ class Recorder:
             )
         }
 
-    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         for name in self.data:
             self.data[name] = list(arrays[name])
 
-    def arrays(self) -> dict[str, np.ndarray]:
+    def arrays(self) -> Arrays:
         """velocity (n, 2) lab frame [m/s]; gap_height (n,) [m]; pairs, on_base (n,) per particle; solid and
         layer_velocity (n, bins): solid fraction and lab-frame velocity along the base; spread (n, 3): variances
         of the particles' velocities [m2/s2]; cycle_end (cycles + 1, particles, 3) [m]; edges, mass."""

@@ -4,9 +4,10 @@ import io
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import load_arrays, write_atomically
@@ -16,10 +17,13 @@ from .base import FLAT, Base, Filling, fit_length, frit_monolayer, loose_filling
 from .box import Box
 from .case import DemCase
 from .gas import GasDrag, slab_solids
-from .sampling import Recorder
+from .sampling import Arrays, Recorder
 from .screen import cycles_done, settling
 from .spec import BoxSpec, Particles
 from .waveform import Waveform
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Comm
 
 SETTLING_DRAG = 0.8
 """Rate of the viscous damping while the filling settles, times sqrt(d/g): particles sink at 1.25 sqrt(g d) at most, too slow to bounce."""
@@ -31,6 +35,8 @@ CLEARANCE, THROWS = 10.0, 8.0
 """Room above the filling: diameters, and heights to which the largest speed of the base throws a particle."""
 TOO_FAST = 20.0
 """Speed over that of base and fall through the bed together that no collision explains; an unstable integration soon passes any bound."""
+Stored = Mapping[str, NDArray[Any]]
+"""The arrays of a state file."""
 Progress = Callable[[float, str], None]  # called with the number of cycles done and what is being done
 
 
@@ -72,7 +78,7 @@ def _glued(case: DemCase, length: float, depth: float) -> Base:
     return sawtooth_baffle(length, depth, options.frit_diameter, options.baffle_height, options.baffle_width)
 
 
-def stored_particles(state: Mapping[str, np.ndarray]) -> Particles:
+def stored_particles(state: Stored) -> Particles:
     """The bed in a state file."""
     return Particles(
         position=state["position"], velocity=state["speed"], spin=state["spin"], classes=state["classes"]
@@ -82,7 +88,7 @@ def stored_particles(state: Mapping[str, np.ndarray]) -> Particles:
 class Simulation:
     """Runs one seed in `directory`; every rank of `comm` takes part, rank 0 records and writes."""
 
-    def __init__(self, case: DemCase, seed: int, directory: Path, comm: Any = None):
+    def __init__(self, case: DemCase, seed: int, directory: Path, comm: "Comm | None" = None):
         self.case, self.seed, self.directory, self.comm = case, seed, directory, comm
         self.rank = comm.rank if comm is not None else 0
         self.spec, self.filling = build(case, seed)
@@ -105,9 +111,7 @@ class Simulation:
     def state_file(self) -> Path:
         return self.directory / "state.npz"
 
-    def run(
-        self, resume: bool = False, progress: Progress = lambda done, doing: None
-    ) -> dict[str, np.ndarray] | None:
+    def run(self, resume: bool = False, progress: Progress = lambda done, doing: None) -> Arrays | None:
         """Simulate up to the case's number of cycles; returns the recorder's arrays on rank 0."""
         if self.rank == 0:
             self.directory.mkdir(parents=True, exist_ok=True)
@@ -227,7 +231,7 @@ class Simulation:
         np.savez(stream, **arrays)
         write_atomically(self.state_file, stream.getvalue())
 
-    def _load(self) -> dict[str, np.ndarray] | None:
+    def _load(self) -> Stored | None:
         """The saved state, None when there is none. Every rank reads it."""
         if not self.state_file.exists():
             return None
@@ -239,14 +243,14 @@ class Simulation:
             )
         return saved
 
-    def load_arrays(self) -> dict[str, np.ndarray]:
+    def load_arrays(self) -> Arrays:
         """The recorder's arrays of a finished seed, up to the case's number of cycles."""
         saved = self._load()
         if saved is None or int(saved["cycles"]) < self.case.run.cycles:
             raise InputError(f"{self.directory}: this seed is not finished; go on with --resume")
         return self._cut({name: saved[name] for name in (*self.recorder.data, "edges")})
 
-    def _cut(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _cut(self, arrays: Arrays) -> Arrays:
         """Leave out cycles beyond the number that is asked for."""
         cycles = self.case.run.cycles
         samples = cycles * self.case.run.samples_per_cycle

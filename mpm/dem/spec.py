@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mpm.arrays import Floats, Ints
+
 from . import cohesion
 from .base import Base
 from .contact import Contact
@@ -19,7 +21,7 @@ class BoxSpec:
     """
 
     powder: Powder
-    diameters: np.ndarray
+    diameters: Floats
     length: float
     depth: float
     height: float
@@ -46,7 +48,7 @@ class BoxSpec:
         """LAMMPS' type of the particles of the base; 1 ... n are the size classes."""
         return len(self.diameters) + 1
 
-    def masses(self) -> np.ndarray:
+    def masses(self) -> Floats:
         """Mass of a particle of each class [kg], shape (n,)."""
         return self.powder.density * math.pi / 6.0 * self.diameters**3
 
@@ -68,12 +70,12 @@ class BoxSpec:
 class Particles:
     """State of the bed, in the order of the particles' numbers: positions unwrapped [m], classes from 0."""
 
-    position: np.ndarray
-    velocity: np.ndarray
-    spin: np.ndarray
-    classes: np.ndarray
+    position: Floats
+    velocity: Floats
+    spin: Floats
+    classes: Ints
 
     @classmethod
-    def at_rest(cls, position: np.ndarray, classes: np.ndarray) -> "Particles":
+    def at_rest(cls, position: Floats, classes: Ints) -> "Particles":
         still = np.zeros_like(position)
         return cls(position=position, velocity=still, spin=still.copy(), classes=classes)

@@ -12,6 +12,8 @@ from typing import Protocol
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from mpm.arrays import Floats
+
 from ..constants import GRAVITY
 
 
@@ -22,9 +24,9 @@ class Waveform(Protocol):
     def frequency(self) -> float:
         """Fundamental frequency [Hz]: one cycle of the profile."""
 
-    def displacement(self, t: np.ndarray) -> np.ndarray: ...
-    def velocity(self, t: np.ndarray) -> np.ndarray: ...
-    def acceleration(self, t: np.ndarray) -> np.ndarray: ...
+    def displacement(self, t: Floats) -> Floats: ...
+    def velocity(self, t: Floats) -> Floats: ...
+    def acceleration(self, t: Floats) -> Floats: ...
 
 
 @dataclass(frozen=True)
@@ -44,19 +46,19 @@ class HarmonicWaveform:
     vertical: tuple[Harmonic, ...]
     frequency: float
 
-    def acceleration(self, t: np.ndarray) -> np.ndarray:
+    def acceleration(self, t: Floats) -> Floats:
         """x'' = sum A cos(w t - phi) (2-7)."""
         return self._sum(t, lambda h, arg, w: h.amplitude * np.cos(arg))
 
-    def velocity(self, t: np.ndarray) -> np.ndarray:
+    def velocity(self, t: Floats) -> Floats:
         """x' = sum A/w sin(w t - phi) (2-8)."""
         return self._sum(t, lambda h, arg, w: h.amplitude / w * np.sin(arg))
 
-    def displacement(self, t: np.ndarray) -> np.ndarray:
+    def displacement(self, t: Floats) -> Floats:
         """x = -sum A/w^2 cos(w t - phi) (2-9)."""
         return self._sum(t, lambda h, arg, w: -h.amplitude / w**2 * np.cos(arg))
 
-    def _sum(self, t: np.ndarray, term: Callable[[Harmonic, np.ndarray, float], np.ndarray]) -> np.ndarray:
+    def _sum(self, t: Floats, term: Callable[[Harmonic, Floats, float], Floats]) -> Floats:
         t = np.atleast_1d(np.asarray(t, dtype=float))
         out = np.zeros((2, t.size))
         for row, harmonics in enumerate((self.horizontal, self.vertical)):
@@ -116,16 +118,16 @@ class Sawtooth:
         """f_b from 1/f_a + 1/f_b = 2/f_1 (2-10)."""
         return 1.0 / (2.0 / self.frequency - 1.0 / self.extension_frequency)
 
-    def displacement(self, t: np.ndarray) -> np.ndarray:
+    def displacement(self, t: Floats) -> Floats:
         return self._evaluate(t, 0)
 
-    def velocity(self, t: np.ndarray) -> np.ndarray:
+    def velocity(self, t: Floats) -> Floats:
         return self._evaluate(t, 1)
 
-    def acceleration(self, t: np.ndarray) -> np.ndarray:
+    def acceleration(self, t: Floats) -> Floats:
         return self._evaluate(t, 2)
 
-    def _evaluate(self, t: np.ndarray, derivative: int) -> np.ndarray:
+    def _evaluate(self, t: Floats, derivative: int) -> Floats:
         t = np.atleast_1d(np.asarray(t, dtype=float))
         period = 1.0 / self.frequency
         quarter = 0.25 / self.extension_frequency
@@ -150,7 +152,7 @@ def sine(gamma: float, frequency: float, angle: float, angle_from: str = "horizo
 
 
 def from_table(
-    t: np.ndarray, acceleration: np.ndarray, frequency: float | None = None, harmonics: int = 16
+    t: Floats, acceleration: Floats, frequency: float | None = None, harmonics: int = 16
 ) -> HarmonicWaveform:
     """One period of accelerations, t of shape (n,), acceleration (2, n) [m/s2], as a Fourier series.
 
