@@ -7,6 +7,7 @@ cycle, `averaged` its mean, both after the field at rest. An impulsive start mar
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +59,8 @@ def periodic_flow(
         acceleration=float(np.mean([m.acceleration for m in motions])),
         frame_velocity_y=float(np.mean([m.frame_velocity_y for m in motions])),
     )
-    # of the last cycle, as vectors; the next one takes their places, because two or their fields would be much to hold beside the factors
-    states: list[Floats] = []
+    # fluxes and pressures of the last cycle; the next one takes their places, because two of them would be much to hold beside the factors
+    states: list[tuple[Floats, Floats]] = []
     velocities = problem.space.velocities(problem.values)
     for cycle in range(CYCLE_LIMIT):
         convective_mean = problem.convective_force().duplicate()
@@ -72,24 +73,24 @@ def periodic_flow(
             before, velocities = velocities, problem.space.velocities(problem.values)
             check_bounded(problem.case, problem.strip, before, velocities, problem.dt)
             state_mean += problem.values / phases
-            state = problem.values.copy()
+            state = problem.values.copy(), problem.pressure()
             if cycle == 0:
                 states.append(state)
                 continue
-            speed = max(speed, np.abs(velocities).max(initial=0.0))
-            change = max(
-                change, np.abs(velocities - problem.space.velocities(states[phase])).max(initial=0.0)
-            )
+            speed = max(speed, problem.space.fastest(state[0]))
+            change = max(change, problem.space.fastest(state[0] - states[phase][0]))
             states[phase] = state
         change = _relative(problem, change, speed) if cycle else np.inf
         if watch is not None:
             watch(cycle, change)
         if change < PERIODIC:
-            problem.values[:] = states[-1]
-            return [problem.field_of(state) for state in states]
+            return [FlowField(problem.space.velocities(fluxes), pressure) for fluxes, pressure in states]
         last = problem.values.copy()
         problem.values[:] = state_mean
-        problem.newton_update(problem.steady_residual(mean, convective_mean))
+        with suppress(
+            ConvergenceError
+        ):  # of a flow that is about to diverge, which the next cycle tells better
+            problem.newton_update(mean, convective_mean)
         problem.values[:] += (
             last - state_mean
         )  # the mean corrected; the last phase keeps its distance from it

@@ -9,10 +9,14 @@ solids together, is continuous across the faces of the moving bed and as free of
 v_s, pore gas is carried at eps v_s. Gas layers have eps = 1, 1/K = 0 and U = u. Walls are no-slip, ports prescribe the normal velocity,
 outlets have p = 0 and no tangential velocity gradient. Where a bed passes the closed ends of a strip, u = 0 there and U = (1-eps) v_s.
 
-Discretisation: Raviart-Thomas of lowest order on quadrilaterals with piecewise constant pressure. The flux through every facet is one
-unknown and div u vanishes exactly in every cell: the marker-and-cell scheme, written as forms. Convection is explicit, so one factor
-serves all steps. The unknowns are those of `mpm.flow.space`, the terms of the equation the functions of `mpm.flow.terms`; this module
-assembles and solves.
+Discretisation: Raviart-Thomas of lowest order on quadrilaterals, the marker-and-cell scheme written as forms; the flux through every facet
+is one number. div u = 0 holds by construction, because the unknowns are a stream function psi (`mpm.flow.space`): with A and M the matrices
+of viscous terms and inertia, N the convection of the state before (`mpm.flow.convection`) and Z the curl, a step from u_p is
+
+    Z^T (A + M/dt) Z dpsi = Z^T (f - N(u) - A u_p - M (u_p - u)/dt),    u' = u_p + Z dpsi,
+
+symmetric and positive definite. Convection is explicit, so one factor serves all steps. What is solved for is a change, so that rounding is
+relative to that. The terms of the equation are the functions of `mpm.flow.terms`; this module assembles and solves.
 """
 
 from __future__ import annotations
@@ -22,20 +26,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import ufl
 from numpy.typing import NDArray
-from ufl import Form, dx
+from ufl import Form
 
+from mpm.flow.convection import Convection
 from mpm.flow.fields import FlowField
 from mpm.flow.space import CLOSED, FlowSpace
-from mpm.flow.terms import (
-    Medium,
-    bed_entrainment,
-    convection,
-    drag,
-    frame_acceleration,
-    inertia,
-    pressure_and_continuity,
-    viscosity,
-)
+from mpm.flow.terms import Medium, bed_entrainment, drag, frame_acceleration, inertia, viscosity
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import StepMotion
 from mpm.numerics.fem import PETSc, dolfinx
@@ -46,48 +42,43 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
 
 Floats = NDArray[np.float64]
+NEWTON_TOLERANCE = 1e-6  # of the inner iteration of a Newton update
+Ports = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
+CLOSED_PORTS: Ports = (0.0, 0.0)
 
 
 class FlowProblem:
-    """Assembled flow operators of a case; advances or balances the mixed vector (u, p), its `state`.
+    """Assembled flow operators of a case; advances or balances the fluxes u, its state.
 
     One factor belongs to the time step `dt` [s] (backward Euler), one to the steady operator; each is made when first needed. Steps of a
-    `refined` problem are the same to 1e-12 at every run on as many ranks.
+    `refined` problem are the same to 1e-12 at every run on as many ranks. `unbalanced` (own fluxes) is the force that the pressure must
+    balance.
     """
 
     def __init__(self, case: Case, strip: Strip, dt: float, refined: bool = False):
         self.case, self.strip, self.dt, self.refined = case, strip, float(dt), refined
         self.space = FlowSpace(case, strip)
-        self.medium = Medium.from_case(case, strip)
-        self.state = dolfinx.fem.Function(self.space.mixed, name="flow")
-        self._assemble()
+        self.state = self.space.function()
+        self.convection_share = 1.0  # below 1 on the way to a fast flow
         self._solvers: dict[str, DirectSolver] = {}
-        self._jacobian: dolfinx.fem.Form | None = None
+        self._assemble()
+        self._ports = CLOSED_PORTS  # of the state
+        self._port_fields = self.space.ports()
+        if self._port_fields[1].any():  # moved in every step: without forces that must cancel then
+            self._port_fields = (self._port_fields[0], self._creeping(self._port_fields[1]))
 
     def _assemble(self) -> None:
-        (u, p), (v, q) = ufl.TrialFunctions(self.space.mixed), ufl.TestFunctions(self.space.mixed)
-        m, mesh = self.medium, self.strip.mesh
-        closed = ufl.Measure("ds", domain=mesh, subdomain_data=self.space.facets)(CLOSED)
-        stokes = viscosity(u, v, m, closed) + drag(u, v, m) + pressure_and_continuity(u, p, v, q)
-        if (
-            not self.case.geometry.outlets
-        ):  # the pressure's level is free: let cell 0 leak p, which pins it at 0 there
-            level = dolfinx.fem.Function(m.porosity.function_space)
-            first = np.flatnonzero(self.strip.cell == 0)
-            level.x.array[level.function_space.dofmap.list[first, 0]] = 1.0
-            stokes += -level * p * q * dx
-        self.steady_matrix = _matrix(stokes)
-        self.mass_matrix = _matrix(inertia(u, v, m) + dolfinx.fem.Constant(mesh, 0.0) * p * q * dx)
+        u, v = ufl.TrialFunction(self.space.fluxes), ufl.TestFunction(self.space.fluxes)
+        m = Medium.from_case(self.case, self.strip)
+        closed = ufl.Measure("ds", domain=self.strip.mesh, subdomain_data=self.space.facets)(CLOSED)
+        self.viscous = _matrix(viscosity(u, v, m, closed) + drag(u, v, m))
+        self.mass = _matrix(inertia(u, v, m))
         solids = self.space.along_x(m.moving_solid)  # their volume flux per unit velocity of the bed
-        self.entrainment = _vector(bed_entrainment(ufl.split(solids)[0], v, m, closed))
+        self.entrainment = _vector(bed_entrainment(solids, v, m, closed))
         self.acceleration = _vector(frame_acceleration(v, m))
-        velocity, _ = ufl.split(self.state)
-        self.convection_share = dolfinx.fem.Constant(mesh, 1.0)  # below 1 on the way to a fast flow
-        convective = self.convection_share * convection(velocity, v, m)
-        self._convection = dolfinx.fem.form(convective)
-        self._jacobian_form = stokes + ufl.derivative(convective, self.state)
-        self._force = _vector(self._convection)
-        self._rhs, self._work, self._fix = (self.steady_matrix.createVecLeft() for _ in range(3))
+        self.convection = Convection(self.space, m.density)
+        self.unbalanced, self._work = (self.viscous.createVecLeft() for _ in range(2))
+        self._psi, self._rhs = (self.space.curl.createVecRight() for _ in range(2))
 
     def release(self) -> None:
         """Give the factors' memory back; they are made anew when needed again. Collective."""
@@ -96,143 +87,186 @@ class FlowProblem:
         self._solvers.clear()
 
     def _solver(self, kind: str) -> DirectSolver:
+        """The factor of Z^T A Z, for a "step" of Z^T (A + M/dt) Z."""
         if kind not in self._solvers:
-            matrix = self.steady_matrix.copy()
+            matrix = self.viscous
             if kind == "step":
-                matrix.axpy(
-                    1.0 / self.dt, self.mass_matrix, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-                )
-            matrix.zeroRowsColumns(self.space.own_fixed + matrix.getOwnershipRange()[0], 1.0)
-            self._solvers[kind] = DirectSolver(matrix, f"flow ({kind})", symmetric=True, refined=self.refined)
+                matrix = self.viscous.copy()
+                matrix.axpy(1.0 / self.dt, self.mass, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            reduced = matrix.ptap(self.space.curl)
+            self._solvers[kind] = DirectSolver(reduced, f"flow ({kind})", definite=True)
         return self._solvers[kind]
 
     # --- solving ---
 
     def convective_force(self) -> PETSc.Vec:
         """N(u) of the present state; the same vector at every call."""
-        force = self._force
-        with force.localForm() as local:
-            local.set(0.0)
-        dolfinx.fem.petsc.assemble_vector(force, self._convection)
-        force.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        force = self.convection.force(self.values)
+        force.scale(self.convection_share)
         return force
 
     def step(self, motion: StepMotion, convective: PETSc.Vec | None = None) -> None:
         """Advance the state by one backward Euler step under the step's mean forcing; convection is taken at the old state."""
         convective = convective if convective is not None else self.convective_force()
-        self.mass_matrix.mult(self.state.x.petsc_vec, self._rhs)
-        self._rhs.scale(1.0 / self.dt)
-        self._solve("step", motion, convective)
+        moved = self._move_ports(motion)
+        self.weigh(motion, convective)
+        if moved is not None:
+            self._work.array[:] = moved[: self.space.own] / self.dt
+            self.mass.multAdd(self._work, self.unbalanced, self.unbalanced)
+        self._balance("step")
 
     def solve_steady(self, motion: StepMotion, convective: PETSc.Vec) -> None:
         """Set the state to the steady solution under `motion` with a given convective force."""
-        self._rhs.set(0.0)
-        self._solve("steady", motion, convective)
+        self._move_ports(motion)
+        self.weigh(motion, convective)
+        self._balance("steady", passes=2)
 
-    def _solve(self, kind: str, motion: StepMotion, convective: PETSc.Vec) -> None:
-        solver = self._solver(kind)
-        rhs = self._rhs
-        rhs.axpy(motion.bed_velocity, self.entrainment)
-        rhs.axpy(motion.acceleration, self.acceleration)
-        rhs.axpy(-1.0, convective)
-        self._prescribe(rhs, kind, motion.frame_velocity_y)
-        solver.solve(rhs, self._work)
-        self._adopt(self._work)
+    def _move_ports(self, motion: StepMotion) -> Floats | None:
+        """Give the state the port flows of a step; returns its change (local fluxes,), None without any."""
+        wanted = (1.0, motion.frame_velocity_y)
+        if wanted == self._ports:
+            return None
+        shares = [new - old for new, old in zip(wanted, self._ports, strict=True)]
+        moved = shares[0] * self._port_fields[0] + shares[1] * self._port_fields[1]
+        self.values[:] += moved
+        self._ports = wanted
+        return np.asarray(moved)
 
-    def steady_residual(self, motion: StepMotion, convective: PETSc.Vec | None = None) -> PETSc.Vec:
-        """K x + N - f of the steady equations at the present state; the same vector at every call.
+    def _creeping(self, values: Floats) -> Floats:
+        """The flow with the same ports as the fluxes `values`, but without inertia and forces."""
+        self.values[:] = values
+        self.viscous.mult(self.state.x.petsc_vec, self.unbalanced)
+        self._balance("steady", passes=2)
+        found = self.values.copy()
+        self.values[:] = 0.0
+        return found
 
-        N is the convective force of the state unless another one is given, as the mean of a cycle is.
+    def weigh(self, motion: StepMotion, convective: PETSc.Vec | None = None) -> None:
+        """Work out A u + N - f of the steady equations at the present state: what the pressure must balance.
+
+        N is the convective force of the state unless another one is given.
         """
-        residual = self._work
-        self.steady_matrix.mult(self.state.x.petsc_vec, residual)
-        residual.axpy(1.0, self.convective_force() if convective is None else convective)
+        residual = self.unbalanced
+        self.viscous.mult(self.state.x.petsc_vec, residual)
         residual.axpy(-motion.bed_velocity, self.entrainment)
         residual.axpy(-motion.acceleration, self.acceleration)
-        residual.array[self.space.own_fixed] = 0.0
-        return residual
+        force = self.convective_force() if convective is None else convective
+        residual.array[:] += force.array[: self.space.own]
 
-    def newton_update(self, residual: PETSc.Vec, exact: bool = False) -> float:
-        """Subtract J^-1 residual from the state; returns the largest change of a velocity over the largest velocity.
+    def _balance(self, kind: str, passes: int = 1) -> None:
+        """Change the state so that `_residual` has no curl; it is kept up to date."""
+        if self._psi.size == 0:
+            return  # walls all around a cell
+        solver = self._solver(kind)
+        for _ in range(passes + self.refined):
+            self.space.curl.multTranspose(self.unbalanced, self._rhs)
+            solver.solve(self._rhs, self._psi)
+            self._adopt()
+            self.viscous.multAdd(self._work, self.unbalanced, self.unbalanced)
+            if kind == "step":
+                self._work.scale(1.0 / self.dt)
+                self.mass.multAdd(self._work, self.unbalanced, self.unbalanced)
 
-        J includes the derivative of the convection. Its system is solved by GMRES with the factor of the steady operator as
-        preconditioner, to 1e-4 of the residual; `exact` makes a factor of J itself. Raises ConvergenceError.
+    def _adopt(self) -> None:
+        """Subtract the curl of `_psi` from the state; leaves the change in `_work`."""
+        self._psi.scale(-1.0)
+        self.space.curl.mult(self._psi, self._work)
+        self.values[: self.space.own] += self._work.array
+        self.state.x.scatter_forward()
+
+    def newton_update(
+        self, motion: StepMotion, convective: PETSc.Vec | None = None, exact: bool = False
+    ) -> float:
+        """One Newton step on the steady equations at the state's ports; returns the largest change of a velocity over the largest velocity.
+
+        N is the convective force of the state unless another one is given, as the mean of a cycle is. The Jacobian, A + dN/du, is solved by
+        GMRES with the factor of A as preconditioner; `exact` makes a factor of the Jacobian itself. Raises ConvergenceError.
         """
-        if self._jacobian is None:
-            self._jacobian = dolfinx.fem.form(self._jacobian_form)
-        # the convection's derivative couples the same facets: copying the pattern spares building it, the peak of memory
-        matrix = self.steady_matrix.duplicate()
-        dolfinx.fem.petsc.assemble_matrix(matrix, self._jacobian)
-        matrix.assemble()
-        matrix.zeroRowsColumns(self.space.own_fixed + matrix.getOwnershipRange()[0], 1.0)
+        self.weigh(motion, convective)
+        if self._psi.size == 0:
+            return 0.0
+        self.space.curl.multTranspose(self.unbalanced, self._rhs)
         if exact:
-            solver = DirectSolver(matrix, "flow (Newton)")
-            solver.solve(residual, self._fix)
+            solver = DirectSolver(self._exact_jacobian(), "flow (Newton)")
+            solver.solve(self._rhs, self._psi)
             solver.destroy()
         else:
-            self._precondition(matrix, residual)
-            matrix.destroy()
-        self.state.x.array[: self.space.own] -= self._fix.array
-        self.state.x.scatter_forward()
-        change, fastest = largest(
-            self.strip.comm, [self.space.fastest(values) for values in (self._fix.array, self.state.x.array)]
-        )
+            self._iterate()
+        self._adopt()
+        change = self.space.fastest(self._work.array)
+        change, fastest = largest(self.strip.comm, [change, self.space.fastest(self.values)])
         return float(change / fastest) if fastest > 0.0 else 0.0
 
-    def _precondition(self, matrix: PETSc.Mat, residual: PETSc.Vec) -> None:
-        """Solve matrix x = residual into `_fix` with the factor of the steady operator."""
-        stokes = self._solver("steady")
-        ksp = PETSc.KSP().create(matrix.comm)
-        # on the right, which fgmres is too; but gmres keeps half the vectors, and this preconditioner does not change
+    def _exact_jacobian(self) -> PETSc.Mat:
+        """Z^T (A + dN/du) Z at the present state."""
+        rows, columns, values = self.convection.slope_matrix(self.values)
+        whole = PETSc.Mat().create(self.strip.comm)
+        whole.setSizes(self.viscous.getSizes())
+        whole.setType("aij")
+        whole.setPreallocationCOO(rows.astype(PETSc.IntType), columns.astype(PETSc.IntType))
+        whole.setValuesCOO(self.convection_share * values)
+        whole.axpy(1.0, self.viscous)
+        return whole.ptap(self.space.curl)
+
+    def _iterate(self) -> None:
+        """Solve Z^T (A + dN/du) Z psi = rhs by GMRES, on the right preconditioned with the factor of Z^T A Z."""
+        steady = self._solver("steady")
+        jacobian = PETSc.Mat().createPython(steady.matrix.getSizes(), _Jacobian(self), self.strip.comm)
+        ksp = PETSc.KSP().create(self.strip.comm)
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        ksp.setTolerances(rtol=1e-4, atol=0.0, max_it=200)
-        ksp.setPC(stokes.ksp.getPC())
-        ksp.setOperators(matrix, stokes.matrix)
+        ksp.setTolerances(rtol=NEWTON_TOLERANCE, atol=0.0, max_it=200)
+        ksp.setPC(steady.ksp.getPC())
+        ksp.setOperators(jacobian, steady.matrix)
         ksp.setGMRESRestart(30)
         try:
-            ksp.solve(residual, self._fix)
+            ksp.solve(self._rhs, self._psi)
             check(ksp, "flow (Newton)")
         finally:
-            stokes.ksp.setOperators(stokes.matrix)
+            steady.ksp.setOperators(steady.matrix)
             ksp.destroy()
-
-    def _prescribe(self, rhs: PETSc.Vec, kind: str, frame_velocity_y: float) -> None:
-        """Move the prescribed unknowns to the right-hand side."""
-        values = self.space.prescribed(frame_velocity_y)
-        self._fix.set(0.0)
-        self._fix.array[self.space.own_fixed] = values
-        lifted = rhs.duplicate()
-        self.steady_matrix.mult(self._fix, lifted)
-        rhs.axpy(-1.0, lifted)
-        if kind == "step":
-            self.mass_matrix.mult(self._fix, lifted)
-            rhs.axpy(-1.0 / self.dt, lifted)
-        lifted.destroy()
-        rhs.array[self.space.own_fixed] = values
-
-    def _adopt(self, values: PETSc.Vec) -> None:
-        self.state.x.array[: self.space.own] = values.array
-        self.state.x.scatter_forward()
+            jacobian.destroy()
 
     # --- looking at the state ---
 
     @property
     def values(self) -> Floats:
-        """The state's unknowns, those of neighbouring ranks included: the array itself, to be read and written."""
+        """The state's fluxes, those of neighbouring ranks included: the array itself, to be read and written."""
         return np.asarray(self.state.x.array)
 
+    def pressure(self) -> Floats:
+        """Pressure in every local cell [Pa] that goes with the step just made; collective."""
+        forces = self.space.function()
+        forces.x.array[: self.space.own] = self.unbalanced.array
+        forces.x.scatter_forward()
+        return self.space.pressure(forces.x.array)
+
     def field(self) -> FlowField:
-        """The present state as a velocity field; a copy."""
-        return self.field_of(self.values)
+        """The present state as a velocity field, with the pressure of the step just made; a copy. Collective."""
+        return FlowField(self.space.velocities(self.values), self.pressure())
 
-    def field_of(self, values: Floats) -> FlowField:
-        """A copy of `values`, made earlier, as a velocity field."""
-        return FlowField(self.space.velocities(values), self.space.pressure(values).copy())
+    def start_from(self, field: FlowField, ports: Ports) -> None:
+        """Make `field`, whose `ports` these are, the present state."""
+        self.values[:] = self.space.from_velocities(field.velocities)
+        self._ports = ports
 
-    def start_from(self, field: FlowField) -> None:
-        """Make `field` the present state."""
-        self.space.fill(self.values, field.velocities, field.pressure)
+
+class _Jacobian:
+    """Z^T (A + dN/du) Z at the state of a problem, as PETSc asks for its product with a vector."""
+
+    def __init__(self, problem: FlowProblem):
+        self.problem, self._change = problem, problem.space.function()
+
+    def mult(self, _: PETSc.Mat, psi: PETSc.Vec, result: PETSc.Vec) -> None:
+        """result = J psi."""
+        problem, change = self.problem, self._change
+        curl, work = problem.space.curl, problem._work
+        curl.mult(psi, change.x.petsc_vec)
+        change.x.scatter_forward()
+        problem.viscous.mult(change.x.petsc_vec, work)
+        slope = problem.convection.slope(problem.values, change.x.array)
+        work.array[:] += problem.convection_share * slope.array[: problem.space.own]
+        curl.multTranspose(work, result)
 
 
 def _matrix(form: Form) -> PETSc.Mat:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from mpm.flow.courant import check_bounded
 from mpm.flow.cycle import mean_motion, periodic_flow
 from mpm.flow.fields import FlowField, mean_field
-from mpm.flow.problem import FlowProblem
+from mpm.flow.problem import CLOSED_PORTS, FlowProblem, Ports
 from mpm.flow.steady import steady_flow
 from mpm.mesh.strip import Strip
-from mpm.motion.kinematics import BedMotion, step_motion
+from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
 
 if TYPE_CHECKING:
@@ -111,14 +111,21 @@ class MarchedFlow:
         """March to the end of `step` (once). Raises ConvergenceError, the old field kept."""
         if self.done == step.index:
             problem = self._resting if step.phase == RESTING else self._problem
-            problem.start_from(self.current)
-            problem.step(step_motion(self.bed_motion, step.since, step.since + step.whole))
+            problem.start_from(self.current, self._ports(step.index))
+            problem.step(self._motion(step))
             reached = problem.field()
             check_bounded(self.case, self.strip, self.current.velocities, reached.velocities, problem.dt)
             self.current = reached
             self.done += 1
             self.recent = [*self.recent, reached][-self.schedule.phases :]
         return self.current
+
+    def _motion(self, step: Step) -> StepMotion:
+        return step_motion(self.bed_motion, step.since, step.since + step.whole)
+
+    def _ports(self, steps: int) -> Ports:
+        """Those of the field after so many steps."""
+        return (1.0, self._motion(self.schedule.step(steps - 1)).frame_velocity_y) if steps else CLOSED_PORTS
 
     def shown(self, step: Step) -> FlowField:
         """The field reached, whatever the step."""

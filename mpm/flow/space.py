@@ -1,6 +1,10 @@
-"""The unknowns of the gas flow: one flux per facet and one pressure per cell, which of them are prescribed, and by what.
+"""The unknowns of the gas flow: velocities without divergence.
 
-Raviart-Thomas of lowest order on quadrilaterals with piecewise constant pressure, as one mixed vector (u, p).
+The flux through every facet is one number, that of Raviart-Thomas elements of lowest order on quadrilaterals. Fields with div u = 0 and the
+prescribed flow through walls and inlets are u = u_p + Z psi: `u_p` is any one of them, psi a stream function on the vertices of the grid
+[m2/s], Z its discrete curl, u_x = dpsi/dy and u_y = -dpsi/dx, whose entries are +-1 (Chorin's null-space method; as exact as the grid is,
+whatever psi). Along a wall psi is one number, because nothing flows through; vertices within an outlet have their own. The pressure is not
+an unknown: it follows from the forces that a solution leaves on each facet.
 """
 
 from __future__ import annotations
@@ -11,119 +15,244 @@ import basix.ufl
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.errors import InputError
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
-from mpm.numerics.fem import dolfinx
+from mpm.numerics.fem import PETSc, dolfinx
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 CLOSED, OPEN = 1, 2  # facet markers: walls and inlets, outlets
 
 
 class FlowSpace:
-    """Mixed function space on the strip, and the way between its vectors and velocities along the axes.
+    """Fluxes through facets, in vectors of the dolfinx space `fluxes`, and the way between them and velocities along the axes.
 
-    `mixed` is the dolfinx space, `own` the number of own unknowns, `fixed` (n,) the local ones that are prescribed; `facets` the markers
-    CLOSED and OPEN of the boundary.
+    `own` is the number of own fluxes; `dofs` (local cells, 4) those of each cell's bottom, left, right and top; `weights` (local fluxes,)
+    the flux per unit velocity along the axes: a facet's length, with the sign of the element's orientation. `facets` are the markers CLOSED
+    and OPEN of the boundary, `curl` is Z.
     """
 
     def __init__(self, case: Case, strip: Strip):
         self.case, self.strip = case, strip
-        element = basix.ufl.mixed_element(
-            [basix.ufl.element("RTCF", "quadrilateral", 1), basix.ufl.element("DQ", "quadrilateral", 0)]
-        )
-        self.mixed = dolfinx.fem.functionspace(strip.mesh, element)
-        self.own: int = self.mixed.dofmap.index_map.size_local
-        dofs = self.mixed.dofmap.list
-        self._facet_dofs, self._pressure_dofs = dofs[:, :4], dofs[:, 4]
-        self._weights = self._facet_weights()
-        self.facets, self.fixed = self._markers()
-        self.own_fixed = self.fixed[self.fixed < self.own]
-        faces = np.unique(self._facet_dofs)
-        self._own_faces = faces[faces < self.own]
-        self._inflow, self._frame_inflow = self._port_values()
-
-    def _facet_weights(self) -> Floats:
-        """Unknown of a facet per unit velocity along the axes (its length, with the sign of the element's orientation)."""
-        velocity_space, to_mixed = self.mixed.sub(0).collapse()
-        ones = dolfinx.fem.Function(velocity_space)
+        element = basix.ufl.element("RTCF", "quadrilateral", 1)
+        self.fluxes = dolfinx.fem.functionspace(strip.mesh, element)
+        self.own: int = self.fluxes.dofmap.index_map.size_local
+        self.dofs: Ints = self.fluxes.dofmap.list.astype(np.int64)
+        ones = dolfinx.fem.Function(self.fluxes)
         ones.interpolate(lambda x: np.ones((2, x.shape[1])))
-        index_map = self.mixed.dofmap.index_map
-        weights = np.ones(index_map.size_local + index_map.num_ghosts)
-        weights[to_mixed] = ones.x.array
-        return weights
+        self.weights: Floats = ones.x.array
+        self.facets = self._markers()
+        self.curl = _curl(self, StreamFunction(case, strip))
 
-    def _markers(self) -> tuple[dolfinx.mesh.MeshTags, NDArray[np.int32]]:
-        """Facets marked closed or open, and the unknowns that are prescribed."""
-        strip, open_facets = self.strip, []
+    def _markers(self) -> dolfinx.mesh.MeshTags:
+        """Facets of the boundary marked closed or open."""
+        strip, open_facets = self.strip, [np.empty(0, np.int64)]
         for outlet in self.case.geometry.outlets:
-            cells = strip.wall_cells(outlet.side)
-            opening = strip.grid.opening(outlet)[strip.column[cells]]
+            opening = strip.grid.opening(outlet)[strip.column[strip.wall_cells(outlet.side)]]
             open_facets.append(strip.wall_facets(outlet.side)[opening])
-        opened = np.concatenate(open_facets) if open_facets else np.empty(0, np.int64)
+        opened = np.concatenate(open_facets)
         boundary = np.concatenate([strip.wall_facets("bottom"), strip.wall_facets("top"), strip.end_facets()])
         closed = np.setdiff1d(boundary, opened)
         facets = np.concatenate([closed, opened])
         values = np.concatenate([np.full(len(closed), CLOSED), np.full(len(opened), OPEN)])
         order = np.argsort(facets)
-        tags = dolfinx.mesh.meshtags(
+        return dolfinx.mesh.meshtags(
             strip.mesh, 1, facets[order].astype(np.int32), values[order].astype(np.int32)
         )
-        is_closed = np.zeros(int(strip.facets.max(initial=-1)) + 1, dtype=bool)
-        is_closed[closed] = True
-        own = strip.facets[: strip.owned]
-        dofs = np.unique(self._facet_dofs[: strip.owned][is_closed[own]])
-        return tags, dofs.astype(np.int32)
 
-    def _port_values(self) -> tuple[Floats, Floats]:
-        """Prescribed normal velocities (as unknowns): of the inlets at rest, and per unit vertical velocity of the frame.
-
-        Inlets that stay in the lab's frame see the mesh move past: their velocity relative to it is v - V_y.
-        """
-        steady, per_frame = np.zeros(len(self._weights)), np.zeros(len(self._weights))
-        lab = self.case.motion.inlet_frame == "lab"
-        for inlet in self.case.geometry.inlets:
-            cells = self.strip.wall_cells(inlet.side)
-            bottom = inlet.side == "bottom"
-            share = self.strip.grid.overlap(inlet)[self.strip.column[cells]] / self.strip.grid.dx
-            dofs = self._facet_dofs[cells, BOTTOM if bottom else TOP]
-            steady[dofs] += self._weights[dofs] * share * inlet.velocity * (1.0 if bottom else -1.0)
-            if lab:
-                per_frame[dofs] -= self._weights[dofs] * share
-        return steady, per_frame
-
-    def prescribed(self, frame_velocity_y: float) -> Floats:
-        """Values of `own_fixed` while the frame moves upwards at `frame_velocity_y` [m/s]."""
-        return np.asarray((self._inflow + frame_velocity_y * self._frame_inflow)[: self.own][self.own_fixed])
+    def function(self, name: str = "flow") -> dolfinx.fem.Function:
+        """A field of fluxes, zero."""
+        return dolfinx.fem.Function(self.fluxes, name=name)
 
     def along_x(self, per_cell: dolfinx.fem.Function) -> dolfinx.fem.Function:
-        """The mixed vector that has a cell function's positive values as velocity along x in those cells, and is zero elsewhere."""
-        vector = dolfinx.fem.Function(self.mixed)
+        """The field that has a cell function's positive values as velocity along x in those cells, and is zero elsewhere."""
+        field = self.function()
         cell_values = per_cell.x.array[per_cell.function_space.dofmap.list[:, 0]]
         inside = np.flatnonzero(cell_values > 0.0)
         for side in (LEFT, RIGHT):
-            dofs = self._facet_dofs[inside, side]
-            vector.x.array[dofs] = self._weights[dofs] * cell_values[inside]
-        vector.x.scatter_forward()
-        return vector
+            dofs = self.dofs[inside, side]
+            field.x.array[dofs] = self.weights[dofs] * cell_values[inside]
+        field.x.scatter_forward()
+        return field
+
+    def ports(self) -> tuple[Floats, Floats]:
+        """Fields u_p (local fluxes,): with the inlets' velocities, and per unit vertical velocity of the frame.
+
+        Inlets that stay in the lab's frame see the mesh move past: their velocity relative to it is v - V_y. Raises InputError where such
+        inlets have nowhere to pass their gas on.
+        """
+        inlets, lab = self.case.geometry.inlets, self.case.motion.inlet_frame == "lab"
+        steady = self._through([i.velocity if i.side == "bottom" else -i.velocity for i in inlets])
+        return steady, self._through([-1.0 if lab else 0.0 for _ in inlets])
+
+    def _through(self, upwards: list[float]) -> Floats:
+        """A field without divergence for these upward velocities in the inlets [m/s]; outlets share what must leave.
+
+        Between the walls u_y changes linearly; u_x, the same in all rows, carries what this leaves.
+        """
+        grid, geometry = self.strip.grid, self.case.geometry
+        wall = {side: np.zeros(grid.columns) for side in ("bottom", "top")}  # upward velocities
+        for inlet, velocity in zip(geometry.inlets, upwards, strict=True):
+            wall[inlet.side] += grid.overlap(inlet) / grid.dx * velocity
+        gained = wall["bottom"].sum() - wall["top"].sum()
+        open_columns = [(o.side, grid.opening(o)) for o in geometry.outlets]
+        count = sum(int(opening.sum()) for _, opening in open_columns)
+        if not count and abs(gained) > ROUNDING * np.abs(wall["bottom"]).sum():
+            raise InputError(
+                "motion.inlet_frame: found inlets that stay in the lab's frame, and no outlet for what the moving reactor takes in; "
+                "accepted: at least one outlet"
+            )
+        for side, opening in open_columns:
+            wall[side][opening] += (1.0 if side == "top" else -1.0) * gained / count
+        height = float(grid.y[-1] - grid.y[0])
+        level = (grid.y - grid.y[0]) / height
+        along = np.concatenate([[0.0], np.cumsum((wall["bottom"] - wall["top"]) * grid.dx / height)])
+        strip = self.strip
+        row, column = strip.row, strip.column
+        field = np.zeros(len(self.weights))
+        for facet, at in ((BOTTOM, level[row]), (TOP, level[row + 1])):
+            upward = (1.0 - at) * wall["bottom"][column] + at * wall["top"][column]
+            field[self.dofs[:, facet]] = upward
+        field[self.dofs[:, LEFT]], field[self.dofs[:, RIGHT]] = along[column], along[column + 1]
+        if grid.periodic:
+            field[self.dofs[column == grid.columns - 1, RIGHT]] = 0.0
+        return field * self.weights
+
+    # --- looking at vectors of fluxes ---
 
     def velocities(self, values: Floats) -> Floats:
-        """Velocities along the axes at the bottom, left, right and top facet of every local cell, (4, cells) [m/s], of a mixed vector."""
-        dofs = self._facet_dofs
-        return np.ascontiguousarray((values[dofs] / self._weights[dofs]).T)
+        """Velocities along the axes at the bottom, left, right and top facet of every local cell, (4, cells) [m/s], of local fluxes."""
+        return np.ascontiguousarray((values[self.dofs] / self.weights[self.dofs]).T)
 
-    def pressure(self, values: Floats) -> Floats:
-        """Pressure in every local cell [Pa] of a mixed vector."""
-        return np.asarray(values[self._pressure_dofs])
-
-    def fill(self, values: Floats, velocities: Floats, pressure: Floats) -> None:
-        """Inverse of `velocities` and `pressure`: write both into the mixed vector `values`."""
-        dofs = self._facet_dofs
-        values[dofs] = velocities.T * self._weights[dofs]
-        values[self._pressure_dofs] = pressure
+    def from_velocities(self, velocities: Floats) -> Floats:
+        """Inverse of `velocities`: (local fluxes,)."""
+        values = np.zeros(len(self.weights))
+        values[self.dofs] = velocities.T * self.weights[self.dofs]
+        return values
 
     def fastest(self, values: Floats) -> float:
-        """Largest velocity at an own face of a mixed vector, this rank's [m/s]."""
-        faces = self._own_faces
-        return float(np.abs(values[faces] / self._weights[faces]).max(initial=0.0))
+        """Largest velocity of own fluxes, this rank's [m/s]."""
+        return float(np.abs(values[: self.own] / self.weights[: self.own]).max(initial=0.0))
+
+    def pressure(self, forces: Floats) -> Floats:
+        """Pressure in every local cell [Pa] from the `forces` on facets that it must balance (local fluxes,); collective.
+
+        Tested with the unit flux through a facet, the pressure's force is p_behind - p_ahead. Outside of outlets p = 0, without one it is 0
+        in the first cell. Summed along columns, whose levels follow from the differences between them, mean over the rows.
+        """
+        strip, grid = self.strip, self.strip.grid
+        own = slice(0, strip.owned)
+        jump = forces * np.sign(self.weights)  # p_behind - p_ahead
+        shape = (grid.rows, grid.columns)
+        across = strip.scatter.to_all(jump[self.dofs[own].T]).reshape(4, *shape)
+        upwards = np.zeros(shape)
+        upwards[1:] = np.cumsum(-across[BOTTOM, 1:], axis=0)
+        step = np.mean(-across[LEFT, :, 1:] - np.diff(upwards, axis=1), axis=0)
+        whole = upwards + np.concatenate([[0.0], np.cumsum(step)])
+        outside = [
+            (whole[0, opening] + across[BOTTOM, 0, opening])
+            if outlet.side == "bottom"
+            else (whole[-1, opening] - across[TOP, -1, opening])
+            for outlet in self.case.geometry.outlets
+            for opening in [grid.opening(outlet)]
+        ]
+        level = float(np.mean(np.concatenate(outside))) if outside else whole[0, 0]
+        return np.asarray((whole - level).ravel()[strip.cell])
+
+
+ROUNDING = 1e-12  # of what flows through a wall
+
+
+class StreamFunction:
+    """Numbers of the unknowns psi on the vertices of the grid, the same on every rank.
+
+    `number` (levels, vertex columns) is the global number of each vertex, -1 where psi = 0; `count` and `first` are those of this rank.
+    """
+
+    def __init__(self, case: Case, strip: Strip):
+        grid, comm = strip.grid, strip.comm
+        columns = grid.columns + (0 if grid.periodic else 1)
+        self.columns = columns
+        group = self._groups(case, strip)
+        owners = strip.scatter.to_all(np.full((1, strip.owned), float(comm.rank)))[0].astype(np.int64)
+        owners = owners.reshape(grid.rows, grid.columns)
+        rows = np.minimum(np.arange(grid.rows + 1), grid.rows - 1)
+        owner = owners[rows][:, np.minimum(np.arange(columns), grid.columns - 1)].ravel()
+        # the first vertex of each group stands for it; group 0 has psi = 0
+        unknowns, first_vertex, inverse = np.unique(group, return_index=True, return_inverse=True)
+        free = unknowns > 0
+        order = np.lexsort((first_vertex[free], owner[first_vertex[free]]))
+        numbers = np.full(len(unknowns), -1)
+        numbers[np.flatnonzero(free)[order]] = np.arange(len(order))
+        self.number = numbers[inverse].reshape(grid.rows + 1, columns)
+        counts = np.bincount(owner[first_vertex[free]], minlength=comm.size)
+        self.count, self.first = int(counts[comm.rank]), int(counts[: comm.rank].sum())
+
+    def _groups(self, case: Case, strip: Strip) -> Ints:
+        """Which vertices share one psi: those of a closed stretch of wall; the first stretch is group 0. (vertices,), level by level."""
+        grid = strip.grid
+        vertices = np.arange((grid.rows + 1) * self.columns).reshape(grid.rows + 1, self.columns)
+        group = vertices.ravel() + 1
+        opened = {side: np.zeros(grid.columns, dtype=bool) for side in ("bottom", "top")}
+        for outlet in case.geometry.outlets:
+            opened[outlet.side] |= grid.opening(outlet)
+        bottom, top = vertices[0], vertices[-1]
+        if grid.periodic:
+            loops = [(bottom, opened["bottom"]), (top, opened["top"])]
+        else:
+            left, right = vertices[1:-1, 0], vertices[1:-1, -1]
+            ends = np.zeros(grid.rows, dtype=bool)
+            whole = np.concatenate([bottom, right, top[::-1], left[::-1]])
+            loops = [(whole, np.concatenate([opened["bottom"], ends, opened["top"][::-1], ends]))]
+        for places, is_open in loops:
+            stretch = np.concatenate([[0], np.cumsum(is_open[:-1])])  # of each vertex, counted along the loop
+            if not is_open[-1]:
+                stretch[stretch == stretch[-1]] = 0
+            group[places] = group[places[0]] + 0 * places if not is_open.any() else _shared(places, stretch)
+        group[group == group[bottom[0]]] = 0
+        return np.asarray(group)
+
+
+def _shared(places: Ints, stretch: Ints) -> Ints:
+    """For each vertex the number, from 1, of the first one on its stretch."""
+    _, first, inverse = np.unique(stretch, return_index=True, return_inverse=True)
+    return np.asarray(places[first][inverse] + 1)
+
+
+def _curl(space: FlowSpace, psi: StreamFunction) -> PETSc.Mat:
+    """Z (fluxes, unknowns psi): the flux through a facet is the difference of psi between its ends."""
+    strip = space.strip
+    row, column = strip.row, strip.column
+    after = (column + 1) % psi.columns
+    ends = {  # lower or left end, upper or right end, sign of the flux along the axis
+        BOTTOM: ((row, column), (row, after), -1.0),
+        TOP: ((row + 1, column), (row + 1, after), -1.0),
+        LEFT: ((row, column), (row + 1, column), 1.0),
+        RIGHT: ((row, after), (row + 1, after), 1.0),
+    }
+    start, end = np.zeros((2, len(space.weights)), dtype=np.int64)
+    sign = np.zeros(len(space.weights))
+    for side, (one, two, direction) in ends.items():
+        dofs = space.dofs[:, side]
+        start[dofs], end[dofs] = psi.number[one], psi.number[two]
+        sign[dofs] = direction * np.sign(space.weights[dofs])
+    own = np.arange(space.own)
+    first = int(strip.comm.scan(space.own)) - space.own
+    differs = start[own] != end[own]  # not along a closed wall
+    rows, columns, values = [], [], []
+    for numbers, part in ((end[own], 1.0), (start[own], -1.0)):
+        chosen = differs & (numbers >= 0)
+        rows.append(first + own[chosen])
+        columns.append(numbers[chosen])
+        values.append(part * sign[own][chosen])
+    curl = PETSc.Mat().create(strip.comm)
+    curl.setSizes(((space.own, None), (psi.count, None)))
+    curl.setType("aij")
+    curl.setPreallocationCOO(
+        np.concatenate(rows).astype(PETSc.IntType), np.concatenate(columns).astype(PETSc.IntType)
+    )
+    curl.setValuesCOO(np.concatenate(values))
+    return curl

@@ -32,6 +32,7 @@ def steady_flow(problem: FlowProblem, motion: StepMotion = REST) -> FlowField:
         _newton(problem, motion, LIMIT)
     except ConvergenceError:
         _grow(problem, motion)
+    problem.weigh(motion)
     return problem.field()
 
 
@@ -45,7 +46,7 @@ def _creep(problem: FlowProblem, motion: StepMotion) -> None:
 def _newton(problem: FlowProblem, motion: StepMotion, limit: int, exact: bool = False) -> None:
     change = np.inf
     for _ in range(limit):
-        last, change = change, problem.newton_update(problem.steady_residual(motion), exact)
+        last, change = change, problem.newton_update(motion, exact=exact)
         if change < CONVERGED or (change < ROUNDING and change > 0.5 * last):
             return
         if not np.isfinite(change):
@@ -62,7 +63,7 @@ def _grow(problem: FlowProblem, motion: StepMotion) -> None:
     try:
         while share < 1.0:
             aim, before = min(share + step, 1.0), problem.values.copy()
-            problem.convection_share.value = aim
+            problem.convection_share = aim
             try:
                 _newton(problem, motion, SHARE_LIMIT, exact=True)
                 share, step = aim, 1.5 * step
@@ -75,4 +76,4 @@ def _grow(problem: FlowProblem, motion: StepMotion) -> None:
                         "speed: slower or wider ports, narrower cells there, or fidelity resolved with startup impulsive"
                     ) from error
     finally:
-        problem.convection_share.value = 1.0
+        problem.convection_share = 1.0

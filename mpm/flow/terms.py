@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import ufl
 from numpy.typing import NDArray
-from ufl import Form, avg, conditional, div, dot, dS, ds, dx, grad, inner, jump, lt
+from ufl import Form, conditional, dot, dS, dx, grad, inner, jump, lt
 
 from mpm.mesh.strip import Strip
 from mpm.numerics.fem import dolfinx
@@ -80,28 +80,8 @@ def shear_distance(heights: Floats, brinkman: Floats) -> Floats:
 
 
 def inertia(u: Expr, v: Expr, m: Medium) -> Form:
-    """(rho/eps) u . v, to be divided by the time step; here and in `convection` the thesis has eps on rho v in the first term alone."""
+    """(rho/eps) u . v, to be divided by the time step; here and in the convection the thesis has eps on rho v in the first term alone."""
     return (m.density / m.porosity) * inner(u, v) * dx
-
-
-def convection(u: Expr, v: Expr, m: Medium) -> Form:
-    """(rho/eps) u.grad w with w = u/eps, the velocity of the gas between the grains: (rho/eps^2) u.grad u within a layer.
-
-    Central in the jumps between cells. What gas brings along when it passes the face of a layer is its own velocity w, which is the same
-    on both sides of a moving bed, where u jumps from eps v_s to v_s: with jumps of u the flow would depend on the frame of the observer.
-    Gas that comes in through a port or outlet carries no tangential velocity. Central differences are safe while u h/nu < 2, which
-    `mpm check` reports.
-    """
-    n = ufl.FacetNormal(ufl.domain.extract_unique_domain(v))
-    c = m.density / m.porosity
-    un = dot(u, n)
-    incoming = conditional(lt(un, 0), un, 0)
-    degree = {"quadrature_degree": 2}
-    return (
-        inner(c / m.porosity * dot(grad(u), u), v) * dx(metadata=degree)
-        - dot(u("+"), n("+")) * inner(jump(u / m.porosity), avg(c * along(v, n))) * dS(metadata=degree)
-        - c / m.porosity * incoming * inner(along(u, n), v) * ds(metadata=degree)
-    )
 
 
 def along(v: Expr, n: Expr) -> Expr:
@@ -128,11 +108,6 @@ def viscosity(u: Expr, v: Expr, m: Medium, closed: ufl.Measure) -> Form:
 def drag(u: Expr, v: Expr, m: Medium) -> Form:
     """(mu/K) u, per direction; with `bed_entrainment` relative to a moving solid. The thesis (5-9) has -mu C |u| of the gas alone."""
     return (m.resistance_x * u[0] * v[0] + m.resistance_y * u[1] * v[1]) * dx
-
-
-def pressure_and_continuity(u: Expr, p: Expr, v: Expr, q: Expr) -> Form:
-    """grad p (integrated by parts, p = 0 at outlets) and -div u = 0, symmetric."""
-    return -(p * div(v) + q * div(u)) * dx
 
 
 def bed_entrainment(solids: Expr, v: Expr, m: Medium, closed: ufl.Measure) -> Form:

@@ -23,13 +23,13 @@ FACTOR_FAILED = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
 class DirectSolver:
     """A sparse factor (MUMPS), made at the first solve and kept; a solve after the matrix has changed makes it anew.
 
-    `symmetric` matrices, definite or not, get L D L^T: half the memory of LU. `refined` solutions are corrected once by the solution for
-    their residual. On several ranks MUMPS never adds up in the same order twice; that takes what two factors differ by from 1e-11 to 1e-13.
+    Symmetric positive `definite` matrices get L L^T: half the memory of LU. On several ranks MUMPS never adds up in the same order twice.
     """
 
-    def __init__(self, matrix: PETSc.Mat, name: str, symmetric: bool = False, refined: bool = False):
-        self.name, self.matrix, self.symmetric, self.refined = name, matrix, symmetric, refined
-        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
+    def __init__(self, matrix: PETSc.Mat, name: str, definite: bool = False):
+        self.name, self.matrix, self.definite = name, matrix, definite
+        if definite:
+            matrix.setOption(PETSc.Mat.Option.SPD, True)
         self._spare = 0
         self._set_up()
 
@@ -38,7 +38,7 @@ class DirectSolver:
         self.ksp.setOperators(self.matrix)
         self.ksp.setType("preonly")
         pc = self.ksp.getPC()
-        pc.setType("cholesky" if self.symmetric else "lu")
+        pc.setType("cholesky" if self.definite else "lu")
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
         factor = pc.getFactorMatrix()
@@ -58,18 +58,6 @@ class DirectSolver:
             self._set_up()
             self.ksp.solve(rhs, solution)
         check(self.ksp, self.name)
-        if self.refined:
-            self._refine(rhs, solution)
-
-    def _refine(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
-        residual, correction = rhs.duplicate(), solution.duplicate()
-        self.matrix.mult(solution, residual)
-        residual.aypx(-1.0, rhs)
-        self.ksp.solve(residual, correction)
-        check(self.ksp, self.name)
-        solution.axpy(1.0, correction)
-        residual.destroy()
-        correction.destroy()
 
     def destroy(self) -> None:
         """Free the matrix and its factor; collective."""
