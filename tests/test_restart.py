@@ -293,7 +293,7 @@ def assert_same_files(one: Path, other: Path, tolerance: float) -> None:
     """Final states and tables of two directories."""
     assert_same_numbers(summary_of(one), summary_of(other), tolerance)
     a, b = (np.load(folder / "run" / "checkpoint.npz", allow_pickle=False) for folder in (one, other))
-    for name in ("concentration", "theta"):
+    for name in ("species.concentration", "coverage.theta"):
         scale = float(np.abs(a[name]).max())
         np.testing.assert_allclose(b[name], a[name], rtol=0.0, atol=tolerance * scale, err_msg=name)
     tables = [(folder / "run" / "history.csv").read_text().splitlines() for folder in (one, other)]
