@@ -237,6 +237,12 @@ def test_a_base_that_leads_back_to_itself_is_refused(tmp_path: Path) -> None:
         load_case(tmp_path / "a.toml")
 
 
+def test_an_inlet_may_stand_at_the_end_of_its_zone(case: Case) -> None:
+    """Fails when the rounding of a sum of lengths puts an inlet outside its zone."""
+    for end in (0.1048, 0.1048 - 1e-16):
+        assert case.with_({"geometry.zone.zone1.end": f"{end!r} m"}).geometry.zones[0].end == end
+
+
 def test_default_zones_follow_the_inlets_that_dose() -> None:
     """As many equal zones as dosing inlets, in their order; a feed of zero still counts (sweeps)."""
     inlets = [

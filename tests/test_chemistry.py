@@ -121,6 +121,7 @@ def test_sticking_may_be_activated(case: Case) -> None:
         ({"sticking": 0.5, "Ea": "-20 kJ/mol"}, "a sticking coefficient of 80.8 at 473 K"),
         ({"sticking": 0.5, "A": "1 m/s"}, "both sticking and A"),
         ({"A": "1 m/s", "Ea": "-9e5 kJ/mol"}, "rate constant of inf"),
+        ({"A": "3 kg"}, r"A: found '3 kg'; accepted: .*0\.9 m/s.*, or .*m\^3/kmol/s"),
     ],
 )
 def test_rates_that_cannot_be_are_refused(case: Case, changes: dict[str, Any], text: str) -> None:

@@ -45,6 +45,14 @@ def test_walk_goes_once_around_a_periodic_strip(grid: Grid, direction: int) -> N
     assert np.allclose(np.diff(distance), grid.dx)
 
 
+def test_walk_ends_at_the_wall_of_a_closed_strip() -> None:
+    """Fails when a walk goes through a wall, or stops before it."""
+    closed = Grid.from_case(load_case("single_zone", {**COARSE, "geometry.periodic": False}))
+    _, right = walk(closed, centres(closed)[50], 1)
+    _, left = walk(closed, centres(closed)[50], -1)
+    assert list(right) == list(range(50, closed.columns)) and list(left) == list(range(50, -1, -1))
+
+
 def test_front_of_a_ramp(grid: Grid) -> None:
     """A concentration that falls linearly upstream from the port: half the feed, and 10 to 90 %, lie where the ramp says."""
     center, reach, feed = 0.1048, 0.05, 2.0

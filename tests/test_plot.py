@@ -185,6 +185,8 @@ def test_streamlines_point_the_way_of_the_gas(zone: Run) -> None:
     (lines,) = [child for child in strip.get_children() if isinstance(child, ContourSet)]
     paths = [path for level in lines.allsegs for path in level]
     assert len(paths) > 20 and all(np.ptp(path[:, 1]) < 1e-9 for path in paths)
+    bottom, top = 1e3 * zone.grid.y[0], 1e3 * zone.grid.y[-1]  # mm
+    assert max(path[0, 1] for path in paths) > top - 0.1 * (top - bottom)
     markers: list[Any] = [line.get_marker() for line in strip.get_lines()]
     angles = [marker[-1] for marker in markers if isinstance(marker, tuple)]
     assert len(angles) > 20 and {(angle + 90.0) % 360.0 for angle in angles} == {180.0}

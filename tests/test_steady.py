@@ -22,6 +22,7 @@ from .cases import (
     CASES,
     COARSE,
     MPI,
+    SHORT,
     TINY,
     assert_laws,
     assert_same_numbers,
@@ -132,6 +133,14 @@ def test_products_where_the_outlet_draws_back_in() -> None:
     assert outlet["backflow"] > 0.7
     assert methane["left"] == pytest.approx(methane["produced"], rel=1e-9)
     assert outlet["x"]["CH4"] == pytest.approx(3.627e-5, rel=1e-3)
+
+
+def test_backflow_of_an_interval() -> None:
+    """Fails when the backflow in a row of the history is not that since the row before: in a steady flow it is the same in all."""
+    _, result = run(zone({**RETURNS, **SHORT}, TINY))
+    share = result.history["outlets.zone1.backflow"]
+    assert len(share) > 4 and share[-1] > 0.5
+    np.testing.assert_allclose(share[2:], share[-1], rtol=1e-9)
 
 
 @pytest.mark.parametrize("speed", [0.001, 0.1, 0.5])

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from mpm.errors import InputError
 from mpm.pictures.maps import PLAIN
-from mpm.sweep.pictures import Scale, draw, heat_map, line, parallel_coordinates, spaced
+from mpm.sweep.pictures import Scale, draw, edges, heat_map, line, parallel_coordinates, spaced
 
 DOSE = Scale("dose", np.repeat([1e-4, 2e-4, 4e-4], 2), (), True)
 SPEED = Scale("speed [cm/s]", np.tile([1.0, 2.0], 3), (), False)
@@ -25,6 +25,12 @@ def drawn(mesh: QuadMesh) -> list[list[float]]:
     values = mesh.get_array()
     assert values is not None
     return np.ma.filled(values, -1.0).tolist()
+
+
+def test_cells_meet_halfway() -> None:
+    """Fails when a border is not halfway between two levels on the scale of its axis, or the outer cells are not symmetric."""
+    assert edges(np.array([1.0, 3.0, 7.0]), False).tolist() == [0.0, 2.0, 5.0, 9.0]
+    assert edges(np.array([1e-4, 1e-2]), True) == pytest.approx([1e-5, 1e-3, 1e-1])
 
 
 def test_cells_show_the_values_of_their_points() -> None:

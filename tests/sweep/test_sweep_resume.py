@@ -19,6 +19,7 @@ def test_a_killed_driver_loses_nothing_and_leaves_nothing(bench: Bench) -> None:
     bench.sweep("[0.1, 0.2, 0.3, 0.4, 0.5]")
     driver = bench.start()
     bench.wait_for(lambda: len(bench.events("start")) == 4 and len(bench.events("step")) > 45)
+    bench.wait_for(lambda: "done" in set(bench.table().status))  # for those who look on
     driver.kill()
     driver.wait()
     finished = set(bench.names("stop"))
