@@ -4,7 +4,8 @@ import re
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from mpm.mesh.grid import Grid
 from mpm.output.directory import RunDirectory
 from mpm.output.results import Run, load_run
 from mpm.pictures.curves import exit_profile_figure, history_figure, outlets_figure, profile_steps
-from mpm.pictures.maps import PLAIN, map_figure
+from mpm.pictures.maps import PLAIN, arrows, map_figure
 from mpm.pictures.outline import WIDTH, formula, spread
 from mpm.pictures.standard import Fields, draw_field, figures, plot_run
 
@@ -191,6 +192,17 @@ def test_streamlines_point_the_way_of_the_gas(zone: Run) -> None:
     angles = [marker[-1] for marker in markers if isinstance(marker, tuple)]
     assert len(angles) > 20 and {(angle + 90.0) % 360.0 for angle in angles} == {180.0}
     assert "lines: streamlines of the gas" in strip.get_title()
+
+
+def test_arrows_lie_along_stretched_lines(zone: Run) -> None:
+    """Fails when an arrow has the gas's angle instead of the line's on a page whose heights are stretched, or points against the gas."""
+    grid = zone.grid
+    rising: Any = SimpleNamespace(cell_data={"velocity": np.full((grid.cells, 2), 0.01)})
+    line = np.array([[40.0, -4.0], [44.0, 0.0]])  # mm
+    for path in (line, line[::-1]):
+        ((x, y, angle),) = arrows(cast(ContourSet, SimpleNamespace(allsegs=[[path]])), grid, rising, 3.0)
+        assert angle == pytest.approx(np.degrees(np.arctan2(3.0, 1.0)))
+        assert 40.0 <= x <= 44.0 and y == pytest.approx(x - 44.0)
 
 
 def test_a_steady_picture_speaks_of_no_time(tmp_path: Path) -> None:
