@@ -115,7 +115,7 @@ def say(console: Console, text: str, indent: int = 0, hang: int = 4, style: str 
     """Print `text`, on a terminal in lines that break between words and hang by `hang` columns under the first."""
     from rich.text import Text
 
-    for line in lines_of(text, console.width, indent, hang):
+    for line in lines_of(text, console.width, indent=indent, hang=hang):
         console.print(Text(line, style=style), soft_wrap=True)
 
 
@@ -125,7 +125,7 @@ def print_warnings(console: Console, warnings: Iterable[str]) -> None:
         say(console, f"warning: {printable(sentence)}", style="yellow")
 
 
-def lines_of(text: str, width: int, indent: int = 0, hang: int = 4) -> list[str]:
+def lines_of(text: str, width: int, *, indent: int = 0, hang: int = 4) -> list[str]:
     """`text` in lines of at most `width` columns, broken between words; a word that is longer has a line of its own.
 
     A number stays with the word behind it, most often its unit.
@@ -163,7 +163,7 @@ def print_steps(steps: Sequence[tuple[str, str]], console: Console) -> None:
         else:
             say(console, f"# {purpose}:", 2)
             words = (together(shlex.quote(word)) for word in shlex.split(command))
-            lines = lines_of(" ".join(words), console.width - 2, 2)
+            lines = lines_of(" ".join(words), console.width - 2, indent=2)
             console.print(Text(" \\\n".join(lines)), soft_wrap=True)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from decimal import Decimal
 from functools import cache, lru_cache
 from typing import Annotated, Any
@@ -110,6 +110,7 @@ class Dimension:
     unit: str
     what: str
     example: str
+    _: KW_ONLY
     above: float | None = None
     at_least: float | None = None
     at_most: float | None = None
@@ -256,7 +257,6 @@ DIFFUSIVITY = Dimension("m^2/s", "a diffusivity", "2.88e-5 m^2/s", at_least=0.0)
 Diffusivity = Annotated[float, DIFFUSIVITY]
 MolarMass = Annotated[float, Dimension("kg/mol", "a molar mass", "28.01 g/mol", above=0.0)]
 MolarEnergy = Annotated[float, Dimension("J/mol", "an activation energy", "20 kJ/mol")]
-SiteDensity = Annotated[float, Dimension("mol/m^2", "a site density", "6.92e-8 mol/m^2", above=0.0)]
 HeatCapacity = Annotated[float, Dimension("J/kg/K", "a heat capacity", "871 J/kg/K", above=0.0)]
 Conductivity = Annotated[float, Dimension("W/m/K", "a thermal conductivity", "1.3 W/m/K", above=0.0)]
 Number = Annotated[float, Dimension("", "a number", "0.5")]

@@ -24,7 +24,7 @@ MOST_ROWS = 3
 """Rows of names above or below the strip; where ports are too dense for that they are numbered."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Pen:
     """The characters of a sketch."""
 
@@ -40,8 +40,30 @@ class Pen:
     right: str
 
 
-BOXES = Pen("─", "│", "┆", "│", "┌┐└┘", "├┤", "↑", "↓", "←", "→")
-ASCII = Pen("-", "|", ":", "|", "++++", "++", "^", "v", "<", ">")
+BOXES = Pen(
+    across="─",
+    wall="│",
+    open_end="┆",
+    leader="│",
+    corners="┌┐└┘",
+    tees="├┤",
+    up="↑",
+    down="↓",
+    left="←",
+    right="→",
+)
+ASCII = Pen(
+    across="-",
+    wall="|",
+    open_end=":",
+    leader="|",
+    corners="++++",
+    tees="++",
+    up="^",
+    down="v",
+    left="<",
+    right=">",
+)
 
 
 def pen_for(encoding: str) -> Pen:
@@ -69,7 +91,7 @@ def sketch(case: Case, width: int, pen: Pen = BOXES) -> list[str]:
     lines += [pen.corners[2] + bottom.wall + pen.corners[3], *bottom.names, _scale(case, inner)]
     lines += _zones(case, inner)
     for text in (top.legend, bottom.legend, _ends(case)):
-        lines += lines_of(text, inner + 2, 1)
+        lines += lines_of(text, inner + 2, indent=1)
     return [line.rstrip() for line in lines]
 
 
@@ -178,7 +200,7 @@ def _layer(case: Case, layer: Layer, inner: int, pen: Pen) -> list[str]:
     elif layer.moving:
         arrow = pen.right if speed > 0.0 else pen.left
         text += f", moves {'right' if speed > 0.0 else 'left'} at {abs(speed) * 1e2:.4g} cm/s {arrow * 3}"
-    return [line.ljust(inner) for line in lines_of(text, inner, 1, 2)]
+    return [line.ljust(inner) for line in lines_of(text, inner, indent=1, hang=2)]
 
 
 def _scale(case: Case, inner: int) -> str:

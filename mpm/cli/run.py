@@ -67,8 +67,8 @@ def run(
         from mpi4py import MPI  # isort: skip  (after fem)
 
         directory = on_root(MPI.COMM_WORLD, lambda: make_numbered(Path(case).stem))
-    summary = _compute(loaded, directory, resume, overwrite, quiet)
-    _show(loaded, summary, directory, not no_report, quiet)
+    summary = _compute(loaded, directory, resume=resume, overwrite=overwrite, quiet=quiet)
+    _show(loaded, summary, directory, report=not no_report, quiet=quiet)
 
 
 @app.command()
@@ -94,8 +94,8 @@ def resume(
     case = load_case(directory / "case.toml", {} if end is None else {"time.end": end})
     if end is not None and case.fidelity == "steady":
         raise InputError.at("resume", "--end", repr(end), "nothing: a steady state has no end")
-    summary = _compute(case, directory, True, False, quiet)
-    _show(case, summary, directory, not no_report, quiet)
+    summary = _compute(case, directory, resume=True, overwrite=False, quiet=quiet)
+    _show(case, summary, directory, report=not no_report, quiet=quiet)
 
 
 @app.command()
@@ -119,7 +119,7 @@ def watch(
         watch_run(directory, once, screen())
 
 
-def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: bool) -> dict[str, Any]:
+def _compute(case: Case, directory: Path, *, resume: bool, overwrite: bool, quiet: bool) -> dict[str, Any]:
     """Run `case` in `directory`, or go on there; returns the summary."""
     from mpm.cli.nextsteps import how_to_go_on
     from mpm.output.rundirs import can_resume
@@ -135,7 +135,7 @@ def _compute(case: Case, directory: Path, resume: bool, overwrite: bool, quiet: 
         )
 
 
-def _show(case: Case, summary: dict[str, Any], directory: Path, report: bool, quiet: bool) -> None:
+def _show(case: Case, summary: dict[str, Any], directory: Path, *, report: bool, quiet: bool) -> None:
     """Print what has come out, and write the page; a page that cannot be written is no failure of the run."""
     if rank() != 0:
         return
