@@ -5,7 +5,10 @@ own may not see, when a file stands in no room, or when two rooms come to see ea
 """
 
 import ast
+import tomllib
 from pathlib import Path
+
+from mpm.revision import WITHOUT_NUMBERS
 
 PACKAGE = Path(__file__).parents[1] / "mpm"
 DOOR = {"__init__", "__main__", "session", "drawing", "optimise"}
@@ -123,3 +126,16 @@ def test_every_room_says_what_it_is_for() -> None:
     for room in MAY_SEE:
         said = ast.get_docstring(ast.parse((PACKAGE / room / "__init__.py").read_text(encoding="utf-8")))
         assert said and said.splitlines()[0].endswith("."), room
+
+
+def test_an_installation_has_every_package() -> None:
+    """Fails when a package, or a package within one, is missing in the list of pyproject.toml: only a working copy would have it."""
+    project = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    packages = {".".join(p.parent.relative_to(PACKAGE.parent).parts) for p in PACKAGE.rglob("__init__.py")}
+    assert packages <= set(project["tool"]["setuptools"]["packages"])
+
+
+def test_what_changes_no_number_is_where_the_revision_looks_for_it() -> None:
+    """Fails when a file that the digest of a run's sources leaves out has moved, so that the digest would count it."""
+    gone = [name for name in WITHOUT_NUMBERS if not (PACKAGE / name).exists()]
+    assert gone == ["cases"]  # which stand in the package when it is installed
