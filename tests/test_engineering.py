@@ -193,6 +193,17 @@ def test_the_step_that_the_warning_advises(case: Case) -> None:
     assert check_case(case.with_({"time.step": "26.2 ms"}))["warnings"] == []
 
 
+def test_memory_grows_with_cells_fields_and_ranks(case: Case) -> None:
+    """Fails when the cells, the fields of a resolved cycle or the ranks are not in the memory that a run will take."""
+    whole = eng.expected_memory(case, 28359)
+    assert whole == pytest.approx(0.6e9, rel=0.05)
+    per_cell = (eng.expected_memory(case, 48359) - whole) / 20000
+    assert 10e3 < per_cell < 30e3
+    resolved = eng.expected_memory(case.with_({"fidelity": "resolved"}), 28359)
+    assert resolved - whole == pytest.approx(28359 * case.time.steps_per_cycle * 250.0, rel=0.1)
+    assert eng.expected_memory(case, 28359, ranks=2) - whole == whole - 28359 * per_cell
+
+
 def test_numerical_diffusion(case: Case) -> None:
     """(Pe/2) coth(Pe/2) - 1 at the bed's and the reactor's speed: small in the zone's columns, Pe^2/12, and steeper in wider ones."""
     fine = case.with_({"fidelity": "resolved"})

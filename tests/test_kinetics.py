@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from mpm.case.case import load_case
+from mpm.physics.exponentials import dphi1, dphi2, phi1, phi2
 from mpm.physics.kinetics import GasKinetics, SurfaceKinetics
 from mpm.physics.mechanism import Mechanism, Site, Species, SurfaceReaction
 from mpm.physics.roles import Roles
@@ -72,6 +74,19 @@ def random_state(rng: np.random.Generator, species: int, sites: int) -> tuple[np
 
 def surface(mechanism: Mechanism, coupled: tuple[str, ...]) -> SurfaceKinetics:
     return SurfaceKinetics(mechanism, coupled, SURFACE, SITES, T)
+
+
+def test_functions_of_the_exponential_keep_their_digits() -> None:
+    """Fails when a term of a series near zero, or the form beyond it, is wrong: each against sympy's 40 digits."""
+    x = sp.Symbol("x")
+    one = (1 - sp.exp(-x)) / x
+    two = (1 - one) / x
+    places = (1e-9, 1e-5, 0.01, 0.0199, 0.0201, 0.1, 0.5, 3.0, 40.0)  # the series ends at 0.02
+    for function, exact in ((phi1, one), (phi2, two), (dphi1, sp.diff(one, x)), (dphi2, sp.diff(two, x))):
+        expected = [float(exact.subs(x, sp.Rational(place)).evalf(40)) for place in places]
+        np.testing.assert_allclose(
+            function(np.array(places)), expected, rtol=1e-10, err_msg=function.__name__
+        )
 
 
 @pytest.mark.parametrize("dt", [1e-6, 1e-2, 1e3])
