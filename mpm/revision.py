@@ -59,15 +59,19 @@ def digest() -> str:
     return found.hexdigest()[:8]
 
 
+def release() -> str:
+    """Version and digest: "0.1.0 (3f2a9c01)"."""
+    return f"{metadata.version('mpm')} ({digest()})"
+
+
 @cache
 def revision() -> str:
     """Version, digest, and in a working copy the commit: "0.1.0 (3f2a9c01), commit 4de27239b with changes"."""
-    known = f"{metadata.version('mpm')} ({digest()})"
     commit = _git("rev-parse", "--short=9", "HEAD") if (PACKAGE.parent / ".git").exists() else ""
     if not commit:
-        return known
+        return release()
     changed = " with changes" if _git("status", "--porcelain", "--untracked-files=no", "--", "mpm") else ""
-    return f"{known}, commit {commit}{changed}"
+    return f"{release()}, commit {commit}{changed}"
 
 
 def _git(*arguments: str) -> str:

@@ -23,7 +23,7 @@ _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ (.*)")
 
 
 @dataclass(frozen=True)
-class Look:
+class Moment:
     """A run at one moment: the last `line` of its log, which is `age` [s] old, and the `numbers` of its latest output."""
 
     line: str
@@ -40,7 +40,7 @@ class Look:
         ]
 
 
-def look(path: Path) -> Look:
+def look(path: Path) -> Moment:
     """What the files of a run in `path` say now. Whatever is just being written counts as not there."""
     log = RunDirectory(path).log
     try:
@@ -53,4 +53,4 @@ def look(path: Path) -> Look:
     except (OSError, InputError):
         rows = []
     told = [line for line in lines if not line.startswith("warning")]
-    return Look(told[-1] if told else "starting", max(age, 0.0), rows[-1] if rows else {})
+    return Moment(told[-1] if told else "starting", max(age, 0.0), rows[-1] if rows else {})

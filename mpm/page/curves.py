@@ -15,10 +15,9 @@ from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.files import read_text
 from mpm.output.results import Run
-from mpm.pictures.outline import OKABE_ITO
+from mpm.pictures.outline import MM, OKABE_ITO
 from mpm.report.quantities import quantity
 
-MM = 1e3
 DECADES = 6.0
 """Extent of a logarithmic axis below its largest value."""
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash")

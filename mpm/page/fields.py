@@ -85,13 +85,6 @@ def levels(values: NDArray[np.floating], low: float, high: float, logarithmic: b
     return np.where(shown, found, 0.0).astype(np.uint16)
 
 
-def value_of(level: NDArray[np.uint16], low: float, high: float, logarithmic: bool) -> Floats:
-    """What the page's script makes of a level; NaN of 0."""
-    place = (level.astype(float) - 1.0) / (LEVELS - 1)
-    values = low * (high / low) ** place if logarithmic else low + place * (high - low)
-    return np.where(level > 0, values, np.nan)
-
-
 def encode(
     look: Look, series: Sequence[NDArray[np.floating]], bounds: tuple[float, float] | None = None
 ) -> Encoded:

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 from mpm.case.case import Case
 from mpm.case.ports import Inlet, Outlet
-from mpm.pictures.outline import OKABE_ITO, spread
+from mpm.pictures.outline import MM, OKABE_ITO, spread
 
 WIDTH = 860.0
 """Length of the strip."""
@@ -20,7 +20,6 @@ LOWEST = 110.0
 """Least height of the strip: a longer one is stretched, and says so."""
 LETTER, LINE = 6.6, 15.0
 """Width of a letter and height of a line of the labels."""
-MM = 1e3
 
 
 @dataclass(frozen=True)

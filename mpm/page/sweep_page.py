@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from mpm.report.quantity import RATIO, Quantity
 from mpm.report.rounding import without_rounding
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
+from mpm.sweep.table import read_results
 
 NAME = "report.html"
 MOST_PAGES = 200
@@ -104,7 +104,7 @@ def sweep_page(directory: str | Path, say: Callable[[str], None] = lambda text: 
     Raises InputError when it holds no table yet.
     """
     root = Path(directory)
-    about, rows = read_json(root / "sweep.json"), _rows(root / "results.csv")
+    about, rows = read_results(root)
     steady = _is_steady(root, rows)
     axes = [_axis(axis, [row[axis["name"]] for row in rows]) for axis in about["axes"]]
     numbers = [name for name in about["columns"] if name not in {axis.name for axis in axes}]
@@ -119,15 +119,6 @@ def sweep_page(directory: str | Path, say: Callable[[str], None] = lambda text: 
         columns=sorted(varied, key=_place),
         points=_points(root, rows, say),
     )
-
-
-def _rows(table: Path) -> list[dict[str, str]]:
-    if not table.is_file():
-        raise InputError.at(
-            table, "", "no such file", "the table of a sweep; mpm sweep writes it when points are done"
-        )
-    with table.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def _is_steady(root: Path, rows: Sequence[dict[str, str]]) -> bool:

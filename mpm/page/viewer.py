@@ -22,6 +22,7 @@ from mpm.page.fields import (
     fewer_times,
     read_film,
 )
+from mpm.pictures.outline import MM
 from mpm.report.dosing import made_sites
 from mpm.report.fieldnames import field_name
 
@@ -29,7 +30,6 @@ BUDGET = 5_000_000
 """Bytes of fields that a page carries at most, beside 2 MB of plotly."""
 VALUES = 6_000_000
 """Numbers of each field that are looked at for a page, cells times times."""
-MM = 1e3
 
 
 def looks(run: Run) -> dict[str, tuple[Look, Maker]]:

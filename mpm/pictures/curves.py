@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -93,13 +92,8 @@ def titrations(run: Run) -> list[tuple[str, dict[str, Floats]]]:
 
 def balance_curves(run: Run) -> dict[str, Floats]:
     """Balance errors in the history by what they are of, in words."""
-    found = {}
-    for key, values in run.history.items():
-        if match := re.fullmatch(r"(balance|elements)\.(.+?)(\.balance_error)?", key):
-            kind, name = match[1], match[2]
-            words = "surface sites" if (kind, name) == ("balance", "sites") else formula(name)
-            found[f"element {words}" if kind == "elements" else words] = values
-    return found
+    errors = {key.removeprefix("balance."): v for key, v in run.history.items() if key.startswith("balance.")}
+    return {"surface sites" if name == "sites" else formula(name): v for name, v in errors.items()}
 
 
 def has_history(run: Run) -> bool:

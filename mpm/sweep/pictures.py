@@ -5,8 +5,6 @@ unit that the sweep file writes, numbers their words and unit of `mpm.report.qua
 explains: a cross at the foot of a line, a hatched cell of a map; they are counted below parallel coordinates.
 """
 
-import csv
-import io
 import math
 import textwrap
 import tomllib
@@ -17,16 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mpm.errors import InputError
 from mpm.files import file_name, write_picture
 from mpm.labels import literal
 from mpm.report.fieldnames import superscript
 from mpm.report.quantities import quantity
 from mpm.report.quantity import Quantity
-from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.quantities import factor
 from mpm.sweep.sweepfile import DEFAULT_PICTURES
-from mpm.sweep.table import choose
+from mpm.sweep.table import WORDS, choose, read_results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -201,9 +197,9 @@ def draw(directory: Path) -> dict[Path, str]:
 
     Raises InputError when `directory` holds no table of a sweep.
     """
-    about, rows = read_files(directory)
+    about, rows = read_results(directory)
     columns = {name: item["unit"] for name, item in about["columns"].items()}
-    taken = {"status", "error", "point", *(axis["name"] for axis in about["axes"])}
+    taken = {*WORDS, *(axis["name"] for axis in about["axes"])}
     names = [
         name
         for name in choose(chosen(about), columns)
@@ -235,22 +231,6 @@ def draw(directory: Path) -> dict[Path, str]:
         write_picture(path, figure, dpi=150)
         drawn[path] = f"{found.label}{unit} over {', '.join(words_of(axis) for axis in about['axes'])}"
     return drawn
-
-
-def read_files(directory: Path) -> tuple[dict[str, Any], list[dict[str, str]]]:
-    """sweep.json and the rows of results.csv. Raises InputError when one is missing or they do not belong together."""
-    layout = Layout(Path(directory))
-    about, table = read_json(layout.root / "sweep.json"), layout.root / "results.csv"
-    if not about or not table.exists():
-        raise InputError.at(
-            directory, "", "a sweep without sweep.json and results.csv", "what `mpm sweep` left when it ended"
-        )
-    rows = list(csv.DictReader(io.StringIO(table.read_text(encoding="utf-8"))))
-    if not rows or any(None in row.values() or set(about["columns"]) - row.keys() for row in rows):
-        raise InputError.at(
-            table, "", "a table that is cut or is not of this sweep.json", "the table that `mpm sweep` wrote"
-        )
-    return about, rows
 
 
 def chosen(about: Mapping[str, Any]) -> Sequence[str]:

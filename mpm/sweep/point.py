@@ -15,14 +15,13 @@ import sys
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from mpm.case.case import load_case
 from mpm.errors import FULL, InputError, StorageError
 from mpm.files import write_atomically
-from mpm.revision import digest
+from mpm.revision import release
 from mpm.sweep import guard
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.lease import Watch
@@ -73,7 +72,7 @@ class Task:
 
 def program() -> str:
     """Version of mpm and a digest of the sources that decide a point's numbers, e.g. "mpm 0.1.0 (3f2a9c01)"."""
-    return f"mpm {metadata.version('mpm')} ({digest()})"
+    return f"mpm {release()}"
 
 
 def clean_environment(environment: Mapping[str, str]) -> dict[str, str]:

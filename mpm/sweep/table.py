@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, float | str | None]
+WORDS = ("status", "error", "point")
+"""Columns that hold no numbers, whatever was varied."""
 
 
 def choose(patterns: Sequence[str], available: Iterable[str]) -> list[str]:
@@ -69,7 +71,7 @@ def write_parquet(
     fields, arrays = [], []
     for column, unit in units.items():
         values = [row.get(column) for row in rows]
-        text = any(isinstance(value, str) for value in values) or column in ("status", "error", "point")
+        text = any(isinstance(value, str) for value in values) or column in WORDS
         kind = pa.string() if text else pa.float64()
         arrays.append(pa.array(values, kind))
         fields.append(pa.field(column, kind, metadata={"unit": unit} if unit else None))
@@ -84,6 +86,24 @@ def write_csv(path: Path, columns: Iterable[str], rows: Sequence[Row]) -> None:
     write_atomically(path, csv_text(list(columns), rows))
 
 
+def read_results(directory: str | Path) -> tuple[dict[str, Any], list[dict[str, str]]]:
+    """sweep.json and the rows of results.csv. Raises InputError when one is missing or they do not belong together."""
+    root = Layout(Path(directory)).root
+    about, table = read_json(root / "sweep.json"), root / "results.csv"
+    if not about or not table.exists():
+        raise InputError.at(
+            directory, "", "no sweep", "a directory that `mpm sweep` wrote, with sweep.json and results.csv"
+        )
+    text = table.read_text(encoding="utf-8")
+    rows = list(csv.DictReader(io.StringIO(text)))
+    foreign = any(None in row.values() or set(about["columns"]) - row.keys() for row in rows)
+    if not text.endswith("\n") or not rows or foreign:
+        raise InputError.at(
+            table, "", "a table that is cut or is not of this sweep.json", "the table that `mpm sweep` wrote"
+        )
+    return about, rows
+
+
 def load_sweep(directory: str | Path) -> "xr.Dataset | pd.DataFrame":
     """A sweep's results: for a grid an xarray Dataset over its axes, for zip and samples a pandas DataFrame.
 
@@ -94,20 +114,8 @@ def load_sweep(directory: str | Path) -> "xr.Dataset | pd.DataFrame":
     """
     import pandas as pd
 
-    layout = Layout(Path(directory))
-    about = read_json(layout.root / "sweep.json")
-    table = layout.root / "results.csv"
-    if not about or not table.exists():
-        raise InputError.at(
-            directory, "", "no sweep", "a directory that `mpm sweep` wrote, with sweep.json and results.csv"
-        )
-    words = {"status", "error", "point", *(axis["name"] for axis in about["axes"] if axis["kind"] == "word")}
-    text = table.read_text(encoding="utf-8")
-    rows = list(csv.DictReader(io.StringIO(text)))
-    if not text.endswith("\n") or not rows or set(about["columns"]) - rows[0].keys():
-        raise InputError.at(
-            table, "", "a table that is cut or is not of this sweep.json", "the table that `mpm sweep` wrote"
-        )
+    about, rows = read_results(directory)
+    words = {*WORDS, *(axis["name"] for axis in about["axes"] if axis["kind"] == "word")}
     frame = pd.DataFrame(
         {
             column: [row[column] if column in words else float(row[column] or "nan") for row in rows]
@@ -138,7 +146,7 @@ def _dataset(
     variables = {}
     for column in frame.columns:
         if column not in names:
-            text = column in ("status", "error", "point")
+            text = column in WORDS
             values = np.full(shape, "", dtype=object) if text else np.full(shape, np.nan)
             values[place] = frame[column].to_numpy()
             variables[column] = (names, values, {"units": units[column]} if column in units else {})
