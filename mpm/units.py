@@ -18,6 +18,7 @@ from typing import Annotated, Any
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from mpm.metric import in_metric, same_kind
 from mpm.spelling import advice
 
 _NUMBER = re.compile(
@@ -65,16 +66,10 @@ def parse(text: str, unit: str) -> float:
 
     Raises ValueError with a short reason: no number, no unit, unknown unit, another dimension.
     """
-    text = _LOOK_ALIKES["-"].sub("-", text)
-    match = _NUMBER.match(text) or _JOINED.match(text)
-    if match is None:
-        raise ValueError("no number with a unit")
-    number, symbol = match.groups()
-    if not symbol:
-        raise ValueError("no unit")
-    registry, wanted, written = _registry(), _registry().Unit(unit), symbol
-    for spelling in ("degC", "degF", "deg"):
-        symbol = _LOOK_ALIKES[spelling].sub(spelling, symbol)
+    number, symbol, written = _parts(text)
+    if (metric := in_metric(number, symbol, unit)) is not None:
+        return metric
+    registry, wanted = _registry(), _registry().Unit(unit)
     try:
         given = registry.Unit(symbol)
     except Exception as error:  # pint raises many types here, down to tokenizer errors
@@ -86,6 +81,32 @@ def parse(text: str, unit: str) -> float:
     if given == registry.degree:
         return math.radians(float(number))  # the float next to the true value; decimals of pi would miss it
     return float(registry.Quantity(Decimal(number), given).to(wanted).magnitude)
+
+
+def is_counted(text: str, unit: str) -> bool:
+    """Whether `parse` accepts this. It does not say why not, which takes the whole list of units."""
+    try:
+        agree = same_kind(_parts(text)[1], unit)
+        if agree is None:
+            parse(text, unit)
+    except ValueError:
+        return False
+    return agree is not False
+
+
+def _parts(text: str) -> tuple[str, str, str]:
+    """The number, its unit as pint writes it, and as it is written. Raises ValueError: no number, no unit."""
+    text = _LOOK_ALIKES["-"].sub("-", text)
+    match = _NUMBER.match(text) or _JOINED.match(text)
+    if match is None:
+        raise ValueError("no number with a unit")
+    number, written = match.groups()
+    if not written:
+        raise ValueError("no unit")
+    symbol = written
+    for spelling in ("degC", "degF", "deg"):
+        symbol = _LOOK_ALIKES[spelling].sub(spelling, symbol)
+    return number, symbol, written
 
 
 def _counts_angle(unit: Any) -> bool:

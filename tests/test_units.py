@@ -1,11 +1,17 @@
 """Conversion at the door: exact, checked for dimension and range, and reversible."""
 
 import math
+import random
+import subprocess
+import sys
+from decimal import Decimal
 
+import pint
 import pytest
 from pydantic_core import PydanticCustomError
 
-from mpm.units import Dimension, parse
+from mpm.metric import METRIC, in_metric
+from mpm.units import Dimension, is_counted, parse
 
 SPEED = Dimension("m/s", "a speed", "3.5 cm/s", at_least=0.0)
 DEADLINE = Dimension("s", "a time", "5 s", above=0.0, infinite=True)
@@ -54,6 +60,61 @@ FRACTION = Dimension("", "a fraction", "0.46", above=0.0, below=1.0)
 )
 def test_conversion_is_exact(text: str, unit: str, value: float) -> None:
     assert parse(text, unit) == pytest.approx(value, rel=1e-15 if unit == "rad" else 0.0, abs=0.0)
+    assert is_counted(text, unit)
+
+
+def test_metric_units_are_those_of_pint() -> None:
+    """Fails when a unit that is read without pint becomes another float than pint makes of it, or one that pint does not know so."""
+    registry, some = pint.UnitRegistry(non_int_type=Decimal, cache_folder=None), random.Random(1)
+    derived = [
+        "um^2",
+        "1/cm",
+        "mm/s",
+        "m^3/kmol/s",
+        "g/cm^3",
+        "Pa s",
+        "mPa*s",
+        "kJ/mol",
+        "mmol/cm^2",
+        "J/g/K",
+        "m^-1",
+        "1/s",
+    ]
+    bases = [
+        "m",
+        "s",
+        "kg",
+        "mol",
+        "K",
+        "Pa",
+        "J",
+        "W",
+        "N",
+        "m^2",
+        "1/m",
+        "m/s",
+        "m^3/mol/s",
+        "kg/m^3",
+        "Pa*s",
+        "J/mol",
+        "mol/m^2",
+    ]
+    read = 0
+    for symbol in [*METRIC, *derived]:
+        for unit in [*bases, "Hz", "J/kg/K"]:
+            number = f"{some.uniform(-1.0, 1.0) * 10.0 ** some.randint(-12, 12):.{some.randint(1, 17)}g}"
+            found = in_metric(number, symbol, unit)
+            if found is not None:
+                assert found == float(registry.Quantity(Decimal(number), symbol).to(unit).magnitude), symbol
+                read += 1
+    assert read > len(METRIC)
+
+
+def test_a_case_is_read_without_loading_pint() -> None:
+    """Fails when a unit of a built-in case is not read as a metric one: every verb would begin half a second later."""
+    for case in ("single_zone", "single_cycle"):
+        program = f"import sys, mpm; mpm.load_case({case!r}); sys.exit('pint' in sys.modules)"
+        assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -98,6 +159,7 @@ def test_conversion_is_exact(text: str, unit: str, value: float) -> None:
 def test_what_is_no_quantity_is_refused(text: str, unit: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         parse(text, unit)
+    assert not is_counted(text, unit)
 
 
 @pytest.mark.parametrize("unit", ["m", "m/s", "Pa*s", "m^3/mol/s", "rad", "K", "mol/m^2", "kg/mol", "J/kg/K"])

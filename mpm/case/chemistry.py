@@ -24,7 +24,7 @@ from mpm.units import (
     Number,
     Sticking,
     Temperature,
-    parse,
+    is_counted,
     reject,
     worked_out,
 )
@@ -36,11 +36,7 @@ GAS_RATE = Dimension("m^3/mol/s", "a second-order rate constant", "1.0 m^3/kmol/
 def _rate_constant(value: Any) -> str:
     """Normalise a rate constant to SI but keep its unit: which of the two is right depends on the reaction."""
     for dimension in (SURFACE_RATE, GAS_RATE):
-        if isinstance(value, str):
-            try:
-                parse(value, dimension.unit)
-            except ValueError:
-                continue
+        if isinstance(value, str) and is_counted(value, dimension.unit):
             return str(dimension.write(dimension.read(value)))
     raise reject(repr(value), f"{SURFACE_RATE.accepted}, or {GAS_RATE.accepted}")
 

@@ -1,4 +1,4 @@
-"""What a run gives to the program that started it."""
+"""What a run gives to the program that started it; what draws is imported where it does, as the solver loads this before its first step."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mpm.errors import InputError
 from mpm.output.history import columns_of
 from mpm.output.results import LastInstant, Run, load_run
-from mpm.page import report
 from mpm.parallel import on_root
-from mpm.pictures.figures import figure_of
 from mpm.reactor import records
 from mpm.report.notebook import result_html
 from mpm.report.verdict import verdict
@@ -40,6 +38,8 @@ class Result:
 
         On one process. Raises InputError for a name that is not there, with the nearest.
         """
+        from mpm.pictures.figures import figure_of
+
         return figure_of(self._run(), name, **options)
 
     def _run(self) -> Run:
@@ -63,6 +63,8 @@ class Result:
 
         Collective; rank 0 writes. Raises InputError for a run that has not written its results (`run(output=...)`).
         """
+        from mpm.page import report
+
         directory = self.directory
         if directory is None:
             raise InputError("report: this run has no directory; accepted: a result of run(output=...)")
