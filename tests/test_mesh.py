@@ -11,7 +11,7 @@ from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.mesh.grid import Grid
 from mpm.mesh.msh import build_mesh, read_msh, write_msh
-from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
+from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip, cell_nodes, node_places
 from mpm.parallel import total
 
 from .cases import COARSE, MPI, TINY, cycle, zone
@@ -20,17 +20,20 @@ COMM = MPI.COMM_WORLD
 GRADED = {**COARSE, "geometry.layer.headspace.grading": 8.0, "geometry.layer.plenum.grading": 0.25}
 
 
-def test_gmsh_gives_the_grid() -> None:
-    """Fails when gmsh's graded nodes leave the grid's edges, the numbering is not row by row, or a layer's group is wrong."""
-    case = zone(mesh=GRADED)
+@pytest.mark.parametrize("periodic", [True, False])
+def test_gmsh_gives_the_cells_that_the_solver_makes(periodic: bool) -> None:
+    """Fails when the file of `mpm mesh` is another mesh than that of a run: a node elsewhere, cells in another order or joined otherwise, a
+    layer's group that is not the layer."""
+    case = zone({"geometry.periodic": periodic}, GRADED)
     grid, quads = Grid.from_case(case), build_mesh(case)
-    row, column = np.divmod(np.arange(grid.cells), grid.columns)
-    corners = quads.points[quads.cells]
-    np.testing.assert_allclose(corners[:, 0], np.column_stack([grid.x[column], grid.y[row]]), atol=1e-9)
-    np.testing.assert_allclose(
-        corners[:, 3], np.column_stack([grid.x[column + 1], grid.y[row + 1]]), atol=1e-9
-    )
-    assert np.array_equal(quads.layer, grid.row_layer[row])
+    cells, places = cell_nodes(grid), node_places(grid)
+    found = quads.points[quads.cells]
+    seam = np.isclose(found[:, :, 0], grid.x[-1]) & periodic
+    found[seam, 0] = 0.0
+    np.testing.assert_allclose(found, places[cells], atol=1e-9)
+    pairs = np.unique(np.column_stack([quads.cells[~seam], cells[~seam]]), axis=0)
+    assert len(pairs) == len(np.unique(pairs[:, 0])) == len(places)
+    assert np.array_equal(quads.layer, np.repeat(grid.row_layer, grid.columns))
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
-"""gmsh builds the strip: transfinite quadrilaterals with the layers and ports as physical groups.
+"""The strip as a gmsh file, for other programs: transfinite quadrilaterals with the layers and ports as physical groups.
 
 One rectangle per layer; the bottom and top walls are split at the columns that a port touches, so that a port's group holds every
-facet it covers, wholly or in part (the share itself is `Grid.overlap`). Meshing happens on one rank; see `mpm.mesh.strip` for the rest.
+facet it covers, wholly or in part (the share itself is `Grid.overlap`). A run makes the same cells from the grid (`mpm.mesh.strip`).
 """
 
 from __future__ import annotations

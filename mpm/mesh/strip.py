@@ -1,8 +1,8 @@
 """The strip as a dolfinx mesh whose topology is truly periodic, with the maps that everything else uses.
 
-Right-edge nodes are replaced by their left-edge partners in the cells' connectivity, so that the mesh closes on itself; every cell
-then owns its four geometry nodes, which keeps each cell's true coordinates although the seam's vertices have two places. Every
-finite element and every facet integral is periodic without constraints.
+Cells and nodes are those of the grid (`mpm mesh` gives the same to gmsh). The right-hand nodes of the last column are the left-hand ones
+of the first, so that the mesh closes on itself; every cell then owns its four geometry nodes, which keeps each cell's true coordinates
+although the seam's vertices have two places. Every finite element and every facet integral is periodic without constraints.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.mesh.grid import Grid
-from mpm.mesh.msh import QuadMesh, build_mesh
 from mpm.numerics.fem import dolfinx
 from mpm.parallel import Scatter, is_root
 
@@ -55,7 +54,7 @@ class Strip:
     def __init__(self, case: Case, comm: MPI.Comm):
         self.comm = comm
         self.grid = grid = Grid.from_case(case)
-        self.mesh = _periodic_mesh(grid, build_mesh(case) if is_root(comm) else None, comm)
+        self.mesh = _periodic_mesh(grid, comm)
         topology = self.mesh.topology
         cells = topology.index_map(2)
         self.owned: int = cells.size_local
@@ -122,14 +121,12 @@ class Strip:
         return function
 
 
-def _periodic_mesh(grid: Grid, quads: QuadMesh | None, comm: MPI.Comm) -> dolfinx.mesh.Mesh:
+def _periodic_mesh(grid: Grid, comm: MPI.Comm) -> dolfinx.mesh.Mesh:
     element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
-    if quads is None:
-        cells, nodes = np.empty((0, 4), np.int64), np.empty((0, 2))
+    if is_root(comm):
+        cells, nodes = cell_nodes(grid), node_places(grid)
     else:
-        cells, nodes = quads.cells, quads.points
-        if grid.periodic:
-            cells = _glue_ends(grid, quads)
+        cells, nodes = np.empty((0, 4), np.int64), np.empty((0, 2))
     partitioner = dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.shared_facet, 2)
     flat = dolfinx.mesh.create_mesh(comm, cells, element, nodes, partitioner)
     topology = flat.topology
@@ -162,9 +159,22 @@ def _periodic_mesh(grid: Grid, quads: QuadMesh | None, comm: MPI.Comm) -> dolfin
     return dolfinx.mesh.Mesh(cpp, ufl.Mesh(element))
 
 
-def _glue_ends(grid: Grid, quads: QuadMesh) -> Ints:
-    """Connectivity in which the right-hand nodes are their left-hand partners."""
-    cells = quads.cells.copy().reshape(grid.rows, grid.columns, 4)
-    cells[:, -1, 1] = cells[:, 0, 0]
-    cells[:, -1, 3] = cells[:, 0, 2]
-    return cells.reshape(-1, 4)
+def cell_nodes(grid: Grid) -> Ints:
+    """The nodes of every cell, in the grid's order: lower left, lower right, upper left, upper right, rows of nodes from the bottom.
+
+    Where the strip is periodic, the right-hand nodes of its last column are the left-hand ones of its first.
+    """
+    row, column = np.divmod(np.arange(grid.cells), grid.columns)
+    per_row = _nodes_per_row(grid)
+    left, right = row * per_row + column, row * per_row + (column + 1) % per_row
+    return np.column_stack([left, right, left + per_row, right + per_row])
+
+
+def node_places(grid: Grid) -> NDArray[np.float64]:
+    """Places (n, 2) [m] of the nodes that `cell_nodes` counts; those of a seam, which has two, at the left-hand end."""
+    x, y = np.meshgrid(grid.x[: _nodes_per_row(grid)], grid.y)
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def _nodes_per_row(grid: Grid) -> int:
+    return grid.columns if grid.periodic else grid.columns + 1
