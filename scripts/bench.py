@@ -15,9 +15,10 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from meshes import FINE_ROWS
+
 ROOT = Path(__file__).resolve().parent.parent
 SECONDS = {"zone": 20.0, "cycle": 60.0}  # simulated by the whole run of each case
-THESIS_ROWS = {"plenum": 20, "frit": 12, "bed": 20, "headspace": 69}  # with 0.34 mm columns: 49,731 cells
 
 
 def worker(name: str, fidelity: str, seconds: float) -> None:
@@ -33,7 +34,7 @@ def worker(name: str, fidelity: str, seconds: float) -> None:
 
     changes: dict[str, object] = {}
     if name == "zone":  # the cycle's file has the thesis' rows
-        changes = {f"geometry.layer.{layer}.cells": n for layer, n in THESIS_ROWS.items()}
+        changes = {**FINE_ROWS}
     changes |= {
         "fidelity": fidelity,
         "time.end": f"{seconds} s",

@@ -16,6 +16,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
+from meshes import COARSE
 from mpm import Reactor, load_case
 from mpm.reactor.flow import Flow
 from mpm.report.dosing import inlet_excess
@@ -26,14 +27,7 @@ PICTURE = ROOT / "docs" / "figures" / "cvd_map_steady.png"
 RATIOS = tuple(round(float(r), 3) for r in np.geomspace(0.25, 4.0, 7))  # 1 is among them
 TICKS = (0.25, 0.5, 1.0, 2.0, 4.0)
 INLETS = {"tma": "TMA", "water": "H2O"}
-MESH: dict[str, Any] = {
-    "fidelity": "steady",
-    "geometry.cell_width": "2.33 mm",
-    "geometry.layer.plenum.cells": 4,
-    "geometry.layer.frit.cells": 3,
-    "geometry.layer.bed.cells": 4,
-    "geometry.layer.headspace.cells": 8,
-}
+MESH: dict[str, Any] = {"fidelity": "steady", **COARSE}
 
 
 def measure() -> dict[str, dict[str, float]]:

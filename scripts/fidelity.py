@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from document import write_between
 
+from meshes import FINE_ROWS
 from mpm import Reactor, load_case
 from mpm.parallel import is_root
 from mpm.reactor.flow import Flow
@@ -30,7 +31,6 @@ DOCUMENT = ROOT / "docs" / "fidelity.md"
 BEGIN, END = "<!-- table: written by scripts/fidelity.py -->", "<!-- end of table -->"
 DOSES = (1e-4, 2e-4, 1e-3)  # mass fraction of TMA
 SITE = "OAl(CH3)2"
-ROWS = {"plenum": 20, "frit": 12, "bed": 20, "headspace": 69}  # 49,731 cells with columns of 0.34 mm
 # averaged with a quarter of a column per step, half, one and two; resolved with 32 steps per cycle
 MODELS: dict[str, dict[str, Any]] = {
     "resolved": {"fidelity": "resolved"},
@@ -47,8 +47,12 @@ def record(model: str, dose: float) -> Path:
 
 def measure(model: str, dose: float, flow: Flow | None) -> Flow:
     """Run one model and keep its coverage of the bed (rows, columns) with its numbers; returns the flow it used."""
-    changes: dict[str, Any] = {f"geometry.layer.{layer}.cells": n for layer, n in ROWS.items()}
-    changes |= {**MODELS[model], "geometry.inlet.tma.mass_fractions.TMA": dose, "output.every": "1 s"}
+    changes = {
+        **FINE_ROWS,
+        **MODELS[model],
+        "geometry.inlet.tma.mass_fractions.TMA": dose,
+        "output.every": "1 s",
+    }
     reactor = Reactor(load_case(ROOT / "cases" / "single_zone.toml", changes), flow=flow)
     flow = reactor.flow
     begun = time.process_time()

@@ -26,18 +26,13 @@ from typing import Any
 import numpy as np
 import psutil
 
+from meshes import rows
 from mpm.case.case import Case, load_case
 from mpm.output.history import History
 
 ROOT = Path(__file__).parents[1]
 TOLERANCE = 1e-10  # of the largest value of a column; balances, which are rounding, absolute
-MESH = {
-    "geometry.cell_width": "5 mm",
-    "geometry.layer.plenum.cells": 3,
-    "geometry.layer.frit.cells": 2,
-    "geometry.layer.bed.cells": 3,
-    "geometry.layer.headspace.cells": 4,
-}
+MESH = {"geometry.cell_width": "5 mm", **rows(3, 2, 3, 4)}
 MODES: dict[str, dict[str, Any]] = {
     "averaged": {"time.end": "5.003 s", "time.step": "14 ms", "output.every": "0.1 s"},
     "impulsive": {

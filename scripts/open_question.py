@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from document import write_between
 
+from meshes import rows
 from mpm import Reactor, load_case
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion
@@ -36,11 +37,8 @@ PASSES, FLUSH = 2.0, 15.0
 LAYERS = ("plenum", "frit", "bed", "headspace")
 SITE = "OAl(CH3)2"
 FRONT = "front.tma.bed.coverage"  # m upstream of the inlet, where the mean coverage of the bed is 1/2
-MESH = {
-    "geometry.layer.plenum.cells": 4,
-    "geometry.layer.frit.cells": 3,
-    "geometry.layer.bed.cells": 4,
-    "geometry.layer.headspace.cells": 8,
+MESH: dict[str, Any] = {
+    **rows(4, 3, 4, 8),
     # the frit, which saturates over hours, starts saturated: then the steady state is near when the runs end
     "material.sintered_powder.initial_coverage": {"OH": 0.0, SITE: 1.0},
 }

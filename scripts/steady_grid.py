@@ -18,6 +18,7 @@ from typing import Any
 
 from document import write_between
 
+from meshes import COARSE, FINE_ROWS, rows
 from mpm import Case, Reactor, load_case
 from mpm.errors import ConvergenceError
 from mpm.parallel import is_root
@@ -36,17 +37,12 @@ WATER = 0.375  # mass of water per mass of TMA: molar 1.5 : 1
 USED_UP = 1e-9  # share of the precursor that may leave where all of it counts as taken up
 
 
-def rows(*cells: int) -> dict[str, int]:
-    layers = ("plenum", "frit", "bed", "headspace")
-    return {f"geometry.layer.{name}.cells": n for name, n in zip(layers, cells, strict=True)}
-
-
 MESHES: dict[tuple[str, str], dict[str, Any]] = {
-    ("coarse", "zone"): {"geometry.cell_width": "2.33 mm", **rows(4, 3, 4, 8)},
-    ("coarse", "cycle"): {"geometry.cell_width": "2.33 mm", **rows(4, 3, 4, 8)},
+    ("coarse", "zone"): COARSE,
+    ("coarse", "cycle"): COARSE,
     ("mid", "zone"): {"geometry.cell_width": "0.9 mm", **rows(8, 4, 8, 20)},
     ("mid", "cycle"): {"geometry.cell_width": "0.9 mm", **rows(8, 4, 8, 20)},
-    ("thesis", "zone"): rows(20, 12, 20, 69),
+    ("thesis", "zone"): FINE_ROWS,
     ("thesis", "cycle"): {},
     ("four-cycles", "cycle"): {},
 }

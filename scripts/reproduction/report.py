@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from meshes import MESHES
 from mpm.files import write_atomically
 from reproduction import ROWS
-from reproduction.meshes import MESHES
 from reproduction.row import HOLDS
 from reproduction.store import ROOT, Lab
 

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshes import MESHES
 from mpm.case.case import Case, load_case
 from mpm.files import write_atomically
 from mpm.output.results import Run, load_run
-from reproduction.meshes import MESHES
 
 ROOT = Path(__file__).parents[2]
 BASES = {name: ROOT / "cases" / "thesis" / f"single_{name}.toml" for name in ("zone", "cycle")}
