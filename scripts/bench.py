@@ -93,7 +93,8 @@ def measure(name: str, fidelity: str, ranks: int, seconds: float) -> dict[str, f
     lines = [line for line in done.stdout.splitlines() if line.startswith("BENCH ")]
     if done.returncode or not lines:
         sys.exit(f"{' '.join(command)} failed:\n{done.stderr[-2000:]}")
-    return json.loads(lines[0].removeprefix("BENCH "))
+    row: dict[str, float] = json.loads(lines[0].removeprefix("BENCH "))
+    return row
 
 
 def main() -> None:

@@ -63,7 +63,8 @@ def measure(model: str, columns: float, gamma: float, speed: float) -> dict[str,
     """
     path = record(model, columns, gamma, speed)
     if path.exists():
-        return json.loads(path.read_text(encoding="utf-8"))
+        known: dict[str, float] = json.loads(path.read_text(encoding="utf-8"))
+        return known
     end = PASSES * 0.1397 / (0.01 * speed) + FLUSH
     case = load_case(
         ROOT / "cases" / "single_zone.toml",
@@ -113,7 +114,8 @@ def dispersion(gamma: float) -> dict[str, list[float]]:
     """Mean of K_xx and K_yy over the effective diffusivity of each layer, at 1.3 cm/s in the widest columns."""
     path = KEPT / f"dispersion-{gamma:g}.json"
     if path.exists():
-        return json.loads(path.read_text(encoding="utf-8"))
+        known: dict[str, list[float]] = json.loads(path.read_text(encoding="utf-8"))
+        return known
     wide = {**MESH, "geometry.cell_width": f"{COLUMNS[0]} mm"}
     case = load_case(ROOT / "cases" / "single_zone.toml", {**wide, "motion.gamma": gamma})
     strip = Strip(case, Reactor(case).comm)

@@ -15,7 +15,7 @@ from mpm.parallel import largest
 from mpm.reactor.reactor import Reactor, Result
 from mpm.report.balances import element_balances, site_balance, species_balances
 
-from mpi4py import MPI  # isort: skip  (after mpm.numerics.fem)
+from mpi4py import MPI as MPI  # isort: skip  (after mpm.numerics.fem)
 
 CASES = Path(__file__).parents[1] / "cases"
 

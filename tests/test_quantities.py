@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from mpm import Reactor, load_case
-from mpm.page.numbers import TERMS, accounts, errors, groups
+from mpm.page.numbers import accounts, errors, groups
 from mpm.reactor.result import Result
+from mpm.report.balances import TERMS
 from mpm.report.quantities import HEADINGS, QUANTITIES, SECTIONS, entry, files_of, quantity
 from mpm.report.quantity import RATIO
 from mpm.report.trees import flatten, nest

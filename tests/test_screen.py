@@ -21,9 +21,9 @@ from mpm.cli import main
 from mpm.cli.nextsteps import how_to_go_on
 from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
 from mpm.reactor.clock import Clock
-from mpm.reactor.progress import Progress, duration
+from mpm.reactor.progress import Progress
 from mpm.report.tables import print_mesh, print_summary
-from mpm.screen import Listing, screen
+from mpm.screen import Listing, duration, screen
 
 from .cases import SHORT, TINY
 

@@ -13,6 +13,7 @@ import mpm.reactor.steady.solver
 from mpm.case.case import Case, load_case
 from mpm.cli import main
 from mpm.errors import ConvergenceError
+from mpm.numerics.linear import DirectSolver
 from mpm.output.results import load_run
 from mpm.physics.exponentials import phi1, phi2
 from mpm.reactor.flow import Flow
@@ -272,14 +273,14 @@ def test_failure_leaves_the_last_iterate(
 
 def test_no_number_is_written_that_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Fails when a linear system without a solution ends otherwise than with ConvergenceError, or leaves NaN in a field or number."""
-    solve = mpm.reactor.steady.solver.DirectSolver.solve
+    solve = DirectSolver.solve
 
     def spoilt(self: Any, rhs: Any, solution: Any) -> None:
         solve(self, rhs, solution)
         if self.name == "steady state":
             solution.array[0] = np.nan
 
-    monkeypatch.setattr(mpm.reactor.steady.solver.DirectSolver, "solve", spoilt)
+    monkeypatch.setattr(DirectSolver, "solve", spoilt)
     case = zone({**STEADY, "geometry.bed_inflow": "periodic"}, TINY)
     with pytest.raises(ConvergenceError, match="steady state: Newton stopped"):
         Reactor(case, MPI.COMM_SELF).run(tmp_path / "run")
