@@ -19,8 +19,8 @@ from mpm.report.quantities import FIRST, quantity
 from mpm.report.quantity import RATIO, Quantity
 from mpm.report.rounding import without_rounding
 from mpm.sweep.layout import Layout, read_json
-from mpm.sweep.quantities import factor
 from mpm.sweep.table import read_results
+from mpm.sweep.values import factor
 
 NAME = "report.html"
 MOST_PAGES = 200

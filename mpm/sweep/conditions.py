@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from mpm.errors import InputError
-from mpm.sweep.quantities import to_number
+from mpm.sweep.values import to_number
 
 OPERATIONS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,

@@ -20,9 +20,9 @@ from mpm.labels import literal
 from mpm.report.fieldnames import superscript
 from mpm.report.quantities import quantity
 from mpm.report.quantity import Quantity
-from mpm.sweep.quantities import factor
 from mpm.sweep.sweepfile import DEFAULT_PICTURES
 from mpm.sweep.table import WORDS, choose, read_results
+from mpm.sweep.values import factor
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

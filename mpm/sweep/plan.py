@@ -10,8 +10,8 @@ from typing import Any
 from mpm.case.case import Case
 from mpm.case.settings import file_in
 from mpm.errors import InputError
-from mpm.sweep.quantities import to_number
 from mpm.sweep.sweepfile import MOST_POINTS, Axis, Sweep
+from mpm.sweep.values import to_number
 
 
 @dataclass(frozen=True)

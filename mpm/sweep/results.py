@@ -15,9 +15,9 @@ from mpm.report.trees import flatten
 from mpm.sweep.layout import Layout, read_json
 from mpm.sweep.plan import Point
 from mpm.sweep.point import error_of, program, status_of
-from mpm.sweep.quantities import to_number
 from mpm.sweep.sweepfile import DEFAULT_COLUMNS, Sweep
 from mpm.sweep.table import Row, choose, write_csv, write_parquet
+from mpm.sweep.values import to_number
 
 PACKAGES = (
     "mpm",

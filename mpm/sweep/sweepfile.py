@@ -31,7 +31,7 @@ from mpm.case.settings import file_in
 from mpm.errors import InputError
 from mpm.files import is_file
 from mpm.sweep.conditions import Condition
-from mpm.sweep.quantities import Range, to_number, unit_as_written
+from mpm.sweep.values import Range, to_number, unit_as_written
 from mpm.units import LARGEST, describe
 
 MOST_POINTS = 100_000

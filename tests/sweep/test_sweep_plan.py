@@ -14,8 +14,8 @@ from mpm.errors import InputError
 from mpm.sweep.cluster import slurm_options
 from mpm.sweep.conditions import Condition
 from mpm.sweep.plan import Point, plan
-from mpm.sweep.quantities import Range, to_number, unit_as_written
 from mpm.sweep.sweepfile import read_sweep
+from mpm.sweep.values import Range, to_number, unit_as_written
 
 TMA = "geometry.inlet.tma.mass_fractions.TMA"
 
