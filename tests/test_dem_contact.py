@@ -110,7 +110,7 @@ def test_oblique_wall_impact(tmp_path: Path, degrees: float, exact: Any) -> None
 @pytest.mark.parametrize("sizes", [(D,), (D, D * 1.0000001)], ids=["hooke", "granular"])
 def test_impact_on_a_frozen_particle_is_the_wall_law(tmp_path: Path, sizes: Any) -> None:
     """Head-on onto a frit particle: both pair styles must treat it as infinitely heavy and use the wall's values."""
-    frit = frit_monolayer(10 * D, 10 * D, D)
+    frit = frit_monolayer(length=10 * D, depth=10 * D, diameter=D)
     on_top = frit.positions[44]
     speed, gap = 0.1, 0.02 * D
     with make(
@@ -182,7 +182,9 @@ SEPARATIONS = (0.0, 0.25e-9, 0.35e-9, 0.5e-9, 1e-9, 3e-9, 9e-9, 10.5e-9)
 def test_cohesion_force_follows_the_formula(tmp_path: Path, kind: str) -> None:
     """Acceleration of a resting particle at eight separations against (2-6), within 0.5 % of the largest force."""
     p, k = POWDERS["GL50"], 30.0
-    hamaker = cohesion.reduced_hamaker(p.hamaker if kind == "pair" else p.wall_hamaker, k, p.stiffness)
+    hamaker = cohesion.reduced_hamaker(
+        hamaker=p.hamaker if kind == "pair" else p.wall_hamaker, stiffness=k, material_stiffness=p.stiffness
+    )
     radius = {"pair": D / 4, "wall": D / 2, "frit": D / 4}[kind]
     for s in SEPARATIONS:
         if kind == "pair":
@@ -196,8 +198,12 @@ def test_cohesion_force_follows_the_formula(tmp_path: Path, kind: str) -> None:
             box.run(0)
             force = box._local("f")[box._local("id") == 1][0].copy()
         pull = force[0] if kind == "pair" else -force[2]
-        exact = float(cohesion.rumpf_force(np.asarray(s), hamaker, radius, p.asperity))
-        assert pull == pytest.approx(exact, abs=5e-3 * cohesion.largest_force(hamaker, radius, p.asperity))
+        exact = float(
+            cohesion.rumpf_force(np.asarray(s), hamaker=hamaker, radius=radius, asperity=p.asperity)
+        )
+        assert pull == pytest.approx(
+            exact, abs=5e-3 * cohesion.largest_force(hamaker=hamaker, radius=radius, asperity=p.asperity)
+        )
 
 
 def test_cohesion_between_very_different_sizes(tmp_path: Path) -> None:
@@ -209,9 +215,11 @@ def test_cohesion_between_very_different_sizes(tmp_path: Path) -> None:
         box.run(0)
         force = box._local("f")[np.argsort(box._local("id"))][:, 0]
     assert state.classes.tolist() == [0, 1]
-    hamaker = cohesion.reduced_hamaker(p.hamaker, k, p.stiffness)
+    hamaker = cohesion.reduced_hamaker(hamaker=p.hamaker, stiffness=k, material_stiffness=p.stiffness)
     radius = D * small / (D + small) / 2
-    assert force[0] == pytest.approx(cohesion.largest_force(hamaker, radius, p.asperity), rel=5e-3)
+    assert force[0] == pytest.approx(
+        cohesion.largest_force(hamaker=hamaker, radius=radius, asperity=p.asperity), rel=5e-3
+    )
 
 
 def test_energy_is_never_gained(tmp_path: Path) -> None:

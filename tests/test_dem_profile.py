@@ -23,7 +23,7 @@ from mpm.dem.waveform import Sawtooth, sine
 from mpm.errors import InputError
 from mpm.physics.fluidisation import minimum_fluidisation_velocity
 
-WAVE = sine(0.3, 16.0, math.radians(60))
+WAVE = sine(gamma=0.3, frequency=16.0, angle=math.radians(60))
 N = 128
 PHASE = np.arange(N) * 360.0 / N
 BASE = WAVE.velocity(PHASE / 360.0 / 16.0)
@@ -32,7 +32,7 @@ BASE = WAVE.velocity(PHASE / 360.0 / 16.0)
 def ideal_curve(liftoff: float, contact: float, flight: float) -> Profile:
     flying = (PHASE - liftoff) % 360.0 < (contact - liftoff) % 360.0
     velocity = np.where(flying, np.array([[flight], [-0.004]]), BASE)
-    return Profile(PHASE, velocity, (~flying).astype(float))
+    return Profile(phase=PHASE, velocity=velocity, contact=(~flying).astype(float))
 
 
 def test_fit_recovers_an_ideal_profile() -> None:
@@ -48,7 +48,7 @@ def test_fit_recovers_an_ideal_profile() -> None:
 def test_fit_of_a_noisy_profile_keeps_the_phases() -> None:
     curve = ideal_curve(100.0, 20.0, 0.013)
     noise = np.random.default_rng(2).normal(0, 3e-4, N)
-    fit = piecewise_fit(Profile(PHASE, curve.velocity + noise, curve.contact), BASE)
+    fit = piecewise_fit(Profile(phase=PHASE, velocity=curve.velocity + noise, contact=curve.contact), BASE)
     assert fit.liftoff == pytest.approx(100.0, abs=8.0) and fit.contact == pytest.approx(20.0, abs=8.0)
     assert fit.flight[0] == pytest.approx(0.013, rel=0.02)
 
@@ -80,7 +80,10 @@ def test_a_profile_says_what_it_was_made_with(tmp_path: Path) -> None:
     assert made is not None
     assert (made.frequency, made.waveform) == (16.0, "sine")
     assert (made.gamma, made.angle) == pytest.approx((0.3, math.radians(60.0)), rel=1e-6)
-    assert conditions(Sawtooth(1e-4, 2e-4, 20.0), "sawtooth").waveform == "sawtooth"
+    assert (
+        conditions(Sawtooth(horizontal=1e-4, vertical=2e-4, frequency=20.0), "sawtooth").waveform
+        == "sawtooth"
+    )
 
 
 def test_flight_interval_interpolates_and_wraps() -> None:
@@ -103,9 +106,11 @@ def test_acceleration_criterion() -> None:
     phase, delay = found
     assert phase == pytest.approx(100.0, abs=9.0)
     assert delay == pytest.approx(phase / 360.0 / 16.0, abs=1e-9)
-    assert acceleration_liftoff(Profile(PHASE, BASE, np.ones(N)), BASE, 1 / 16) is None
+    assert acceleration_liftoff(Profile(phase=PHASE, velocity=BASE, contact=np.ones(N)), BASE, 1 / 16) is None
     assert (
-        acceleration_liftoff(Profile(PHASE, 0.3 * np.roll(BASE, 20, axis=1), np.ones(N)), BASE, 1 / 16)
+        acceleration_liftoff(
+            Profile(phase=PHASE, velocity=0.3 * np.roll(BASE, 20, axis=1), contact=np.ones(N)), BASE, 1 / 16
+        )
         is None
     )
 
@@ -151,7 +156,7 @@ def test_residence_times_and_cycle_velocity() -> None:
 def test_slab_volumes_add_up() -> None:
     """Spheres cut by slab edges: all volume is found, and a sphere cut at its middle is halved."""
     d = np.array([1.0, 2.0])
-    solids = slab_solids(np.array([1.0, 2.0]), d, np.array([-1.0, 1.0, 2.0, 5.0]))
+    solids = slab_solids(height=np.array([1.0, 2.0]), diameter=d, edges=np.array([-1.0, 1.0, 2.0, 5.0]))
     assert solids.sum() == pytest.approx(np.pi / 6 * (d**3).sum())
     assert solids[0] == pytest.approx(np.pi / 12)
 
@@ -165,23 +170,34 @@ def test_drag_carries_the_bed_at_minimum_fluidisation(name: str) -> None:
         diameter=p.diameter, sphericity=p.sphericity, density_solid=p.density, porosity=0.45,
         viscosity=mu, density_gas=air, ergun=p.ergun,
     )  # fmt: skip
-    gas = GasDrag(p, mu, air, velocity)
+    gas = GasDrag(powder=p, viscosity=mu, density=air, velocity=velocity)
     edges = gas.edges(20 * p.diameter)
     height = np.full(3, 10 * p.diameter)
     size = np.full(3, p.diameter)
-    gamma = gas.coefficients(height, np.full(3, velocity), size, edges, np.full(len(edges) - 1, 0.55))
+    gamma = gas.coefficients(
+        height=height,
+        relative=np.full(3, velocity),
+        diameter=size,
+        edges=edges,
+        solid=np.full(len(edges) - 1, 0.55),
+    )
     assert gamma * velocity == pytest.approx(p.weight * (1 - air / p.density), rel=1e-3)
     assert gas.flux(0.01) == velocity - 0.01
-    assert GasDrag(p, mu, air, velocity, rests_in_lab=False).flux(0.01) == velocity
+    assert (
+        GasDrag(powder=p, viscosity=mu, density=air, velocity=velocity, rests_in_lab=False).flux(0.01)
+        == velocity
+    )
 
 
 def test_filling_touches_nothing_and_has_the_right_volume() -> None:
     """Loose packings do not overlap, hold every size class equally often, and fill 0.6 of the settled height."""
     sizes = POWDERS["GL56"].size_classes(5)
     d = POWDERS["GL56"].diameter
-    frit = frit_monolayer(18 * 25e-6, 9 * 25e-6, 25e-6)
+    frit = frit_monolayer(length=18 * 25e-6, depth=9 * 25e-6, diameter=25e-6)
     assert frit.top == pytest.approx(0.0) and len(frit.positions) == 162
-    filling = loose_filling(18 * 25e-6, 9 * 25e-6, 15 * d, sizes, frit, 3)
+    filling = loose_filling(
+        length=18 * 25e-6, depth=9 * 25e-6, height=15 * d, diameters=sizes, base=frit, seed=3
+    )
     diameter = sizes[filling.classes]
     volume = np.pi / 6 * (diameter**3).sum()
     assert volume == pytest.approx(0.6 * 18 * 9 * 25e-6**2 * 15 * d, rel=0.02)
@@ -195,7 +211,7 @@ def test_filling_touches_nothing_and_has_the_right_volume() -> None:
 
 
 def test_sawtooth_has_its_height_width_and_no_holes() -> None:
-    base = sawtooth_baffle(64 * 125e-6, 10 * 125e-6, 125e-6, 2e-3, 2e-3)
+    base = sawtooth_baffle(length=64 * 125e-6, depth=10 * 125e-6, diameter=125e-6, height=2e-3, width=2e-3)
     assert base.top == pytest.approx(2e-3, rel=1e-6)
     assert tooth_area(base) == pytest.approx(0.5 * 2e-3 * 2e-3, rel=0.05)
     profile = base.positions[np.isclose(base.positions[:, 1], 62.5e-6)]

@@ -11,7 +11,7 @@ from mpm.dem.bed import bond_numbers
 from mpm.dem.case import load_case
 from mpm.dem.cohesion import largest_force, reduced_hamaker, rumpf_force
 from mpm.dem.contact import Contact
-from mpm.dem.powder import POWDERS
+from mpm.dem.powder import POWDERS, Powder
 from mpm.dem.simulate import build
 from mpm.errors import InputError
 from mpm.physics import conveying, fluidisation
@@ -113,25 +113,29 @@ def test_drag_is_continuous_in_the_slip_and_finite_at_rest() -> None:
 def test_granular_bond_numbers_of_the_seed() -> None:
     """23.8 (24, table 2.1), 19 and 76 (table 3.3); and 307 with the Hamaker constant of section 2.4.4."""
 
-    def bond_number(powder: Any, *force: Any) -> float:
+    def bond_number(powder: Powder, *, hamaker: float, radius: float) -> float:
+        force = largest_force(hamaker=hamaker, radius=radius, asperity=powder.asperity)
         return fluidisation.granular_bond_number(
-            cohesion=largest_force(*force), diameter=powder.diameter, density=powder.density
+            cohesion=force, diameter=powder.diameter, density=powder.density
         )
 
     gl50, gl56 = POWDERS["GL50"], POWDERS["GL56"]
     for p, expected in ((gl50, 23.8), (gl56, 19.0)):
-        assert bond_number(p, p.hamaker, p.diameter / 4, p.asperity) == pytest.approx(expected, rel=5e-3)
-    wall = bond_number(gl56, gl56.wall_hamaker, gl56.diameter / 2, gl56.asperity)
+        found = bond_number(p, hamaker=p.hamaker, radius=p.diameter / 4)
+        assert found == pytest.approx(expected, rel=5e-3)
+    wall = bond_number(gl56, hamaker=gl56.wall_hamaker, radius=gl56.diameter / 2)
     assert wall == pytest.approx(76.0, rel=5e-3)
-    assert (gl50.diameter, gl50.density) == (50e-6, 2500)
-    assert bond_number(gl50, 4e-19, 12.5e-6, 1e-9) == pytest.approx(307, rel=5e-3)
+    assert (gl50.diameter, gl50.density, gl50.asperity) == (50e-6, 2500, 1e-9)
+    assert bond_number(gl50, hamaker=4e-19, radius=12.5e-6) == pytest.approx(307, rel=5e-3)
 
 
 def test_rumpf_force_is_held_inside_and_ends_outside() -> None:
     s = np.array([-1e-9, 0.0, 0.3e-9, 0.4e-9, 9.9e-9, 10.1e-9])
-    f = rumpf_force(s, 3.1e-20, 12.5e-6, 1e-9)
+    f = rumpf_force(s, hamaker=3.1e-20, radius=12.5e-6, asperity=1e-9)
     assert f[0] == f[1] == f[2] > f[3] > f[4] > 0.0 == f[5]
-    assert reduced_hamaker(3.1e-20, 25.0, 2500.0) == pytest.approx(3.1e-21)
+    assert reduced_hamaker(hamaker=3.1e-20, stiffness=25.0, material_stiffness=2500.0) == pytest.approx(
+        3.1e-21
+    )
 
 
 def test_mean_free_path_of_the_seed() -> None:
@@ -144,8 +148,10 @@ def test_mean_free_path_of_the_seed() -> None:
 
 def test_collision_time_and_damping() -> None:
     """An undamped collision takes pi sqrt(m/k); the damping of (2-5) gives back its restitution."""
-    assert Contact(3.0, 1.0, 0.3).duration(8e-11) == pytest.approx(math.pi * math.sqrt(8e-11 / 3.0))
-    contact = Contact(300.0, 0.83, 0.4)
+    assert Contact(stiffness=3.0, restitution=1.0, friction=0.3).duration(8e-11) == pytest.approx(
+        math.pi * math.sqrt(8e-11 / 3.0)
+    )
+    contact = Contact(stiffness=300.0, restitution=0.83, friction=0.4)
     rate = contact.damping(1.6e-10) / 2 / 1.6e-10
     assert math.exp(-rate * contact.duration(1.6e-10)) == pytest.approx(0.83)
 

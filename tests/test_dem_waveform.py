@@ -18,7 +18,11 @@ def derivative(values: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "wave",
-    [wf.sine(0.3, 16.0, math.pi / 3), wf.seed_table_2_2(), wf.Sawtooth(113e-6, 80e-6, 48.0)],
+    [
+        wf.sine(gamma=0.3, frequency=16.0, angle=math.pi / 3),
+        wf.seed_table_2_2(),
+        wf.Sawtooth(horizontal=113e-6, vertical=80e-6, frequency=48.0),
+    ],
     ids=["sine", "table 2.2", "sawtooth"],
 )
 def test_velocity_and_acceleration_are_derivatives(wave: Any) -> None:
@@ -32,18 +36,18 @@ def test_velocity_and_acceleration_are_derivatives(wave: Any) -> None:
 
 def test_sine_follows_the_conventions_of_the_reactor() -> None:
     """Gamma 0.30, 16 Hz, 60 deg from the horizontal: A_x 0.168 mm, A_y 0.291 mm, displacement A sin(phase)."""
-    wave = wf.sine(0.30, 16.0, math.radians(60))
+    wave = wf.sine(gamma=0.30, frequency=16.0, angle=math.radians(60))
     phase = np.linspace(0, 2 * np.pi, 50)
     d = wave.displacement(phase / (2 * np.pi * 16.0))
     assert d[1] == pytest.approx(0.3 * 9.81 / (2 * np.pi * 16) ** 2 * np.sin(phase), abs=1e-12)
     assert wf.peak_displacement(wave) == pytest.approx((0.168e-3, 0.291e-3), rel=3e-3)
-    other = wf.sine(0.30, 16.0, math.radians(60), "vertical")
+    other = wf.sine(gamma=0.30, frequency=16.0, angle=math.radians(60), angle_from="vertical")
     assert wf.peak_displacement(other)[0] / wf.peak_displacement(other)[1] == pytest.approx(math.sqrt(3))
 
 
 def test_sawtooth_satisfies_its_constraints() -> None:
     """(2-10), (2-11): equal displacement, continuous velocity, 3/4 of the cycle out; 2.27 cm/s out at 113 um."""
-    saw = wf.Sawtooth(113e-6, 113e-6, 48.0)
+    saw = wf.Sawtooth(horizontal=113e-6, vertical=113e-6, frequency=48.0)
     assert 1 / saw.extension_frequency + 1 / saw.retraction_frequency == pytest.approx(2 / 48.0)
     assert wf.extension_velocity(saw) == pytest.approx(2.27e-2, rel=3e-3)
     t = np.arange(40000) / 40000 / 48.0
@@ -67,7 +71,9 @@ def test_seed_waveform_limits() -> None:
 def test_table_reproduces_a_waveform_from_uneven_samples() -> None:
     """Fails if the resampling, the signs or the alignment of a tabulated period are wrong."""
     wave = wf.HarmonicWaveform(
-        (wf.Harmonic(3.0, 20.0), wf.Harmonic(1.0, 60.0, 0.4)), (wf.Harmonic(5.0, 20.0),), 20.0
+        (wf.Harmonic(amplitude=3.0, frequency=20.0), wf.Harmonic(amplitude=1.0, frequency=60.0, phase=0.4)),
+        (wf.Harmonic(amplitude=5.0, frequency=20.0),),
+        20.0,
     )
     rng = np.random.default_rng(3)
     t = np.sort(np.r_[0.0, rng.uniform(0, 0.05, 400), 0.05])

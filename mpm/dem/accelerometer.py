@@ -3,11 +3,10 @@
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from mpm.arrays import Floats
 from mpm.errors import InputError
@@ -147,16 +146,12 @@ def spectrum(interval: float, signal: Floats) -> tuple[Floats, Floats]:
 
 
 def largest_peaks(frequency: Floats, amplitude: Floats, count: int) -> list[tuple[float, float]]:
-    """The `count` largest local maxima (frequency, amplitude), at least three bins apart and above bin 2."""
-    inner = np.arange(2, amplitude.size - 1)
-    peaks = inner[(amplitude[inner] >= amplitude[inner - 1]) & (amplitude[inner] > amplitude[inner + 1])]
-    chosen: list[int] = []
-    for k in peaks[np.argsort(-amplitude[peaks])]:
-        if all(abs(int(k) - other) > 2 for other in chosen):
-            chosen.append(int(k))
-        if len(chosen) == count:
-            break
-    return [(float(frequency[k]), float(amplitude[k])) for k in chosen]
+    """The `count` largest local maxima (frequency, amplitude), at least three bins apart, from bin 2 on."""
+    from scipy.signal import find_peaks  # which takes a second to load
+
+    peaks = find_peaks(amplitude[1:], distance=3)[0] + 1
+    largest = peaks[np.argsort(-amplitude[peaks])][:count]
+    return [(float(frequency[k]), float(amplitude[k])) for k in largest]
 
 
 def fit_channel(t: Floats, signal: Floats, count: int) -> Fit:
@@ -178,6 +173,8 @@ def fit_channel(t: Floats, signal: Floats, count: int) -> Fit:
         solution = np.linalg.lstsq(basis, signal, rcond=None)[0]
         return solution, basis @ solution - signal
 
+    from scipy.optimize import least_squares  # as slow to load
+
     best = least_squares(
         lambda shift: project(start + width * shift)[1], np.zeros(start.size), bounds=(-2.0, 2.0)
     )
@@ -187,7 +184,7 @@ def fit_channel(t: Floats, signal: Floats, count: int) -> Fit:
     amplitudes, phases = np.hypot(a, b), np.arctan2(b, a)
     kept = amplitudes >= NOISE * amplitudes.max()
     terms = zip(amplitudes[kept], frequencies[kept], phases[kept], strict=True)
-    harmonics = tuple(Harmonic(float(A), float(f), float(p)) for A, f, p in terms)
+    harmonics = tuple(Harmonic(amplitude=float(A), frequency=float(f), phase=float(p)) for A, f, p in terms)
     raw = np.array([amplitude for _, amplitude in peaks])[kept]
     correction = tuple((amplitudes[kept] / raw).tolist())
     return Fit(harmonics, correction, float(1.0 - residual.var() / signal.var()))
@@ -210,7 +207,7 @@ def fit_record(record: Record, count: int = 3) -> tuple[HarmonicWaveform, Fit, F
             return h
         # keep the phase in the middle of the record
         turn = 2.0 * np.pi * (fundamental - h.frequency) * 0.5 * duration
-        return Harmonic(h.amplitude, fundamental, float(h.phase + turn))
+        return replace(h, frequency=fundamental, phase=float(h.phase + turn))
 
     horizontal = tuple(lock(h) for h in along.harmonics)
     return HarmonicWaveform(horizontal, vertical.harmonics, fundamental).aligned(), along, vertical

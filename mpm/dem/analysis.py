@@ -14,7 +14,7 @@ from .spec import BoxSpec
 from .waveform import Waveform
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Results:
     """Curves over the cycle (n phases), maps over height, per-seed numbers; see the docstrings of the functions."""
 
@@ -93,7 +93,7 @@ def analyse(case: DemCase, spec: BoxSpec, masses: list[Floats], records: list[Ar
     gaps = np.concatenate([gap_over_phase(r, samples, discard) for r in records])
     rises = np.concatenate([rise_over_phase(r, samples, discard) for r in records])
     contact = (rises <= LIFTED * spec.powder.diameter).mean(axis=0)
-    curve = Profile(phase, mean_over("velocity").T, contact)
+    curve = Profile(phase=phase, velocity=mean_over("velocity").T, contact=contact)
     base = waveform.velocity(times)
     residence = np.concatenate(
         [residence_times(r, discard, waveform, case.profile.residence_length) for r in records]
@@ -104,7 +104,7 @@ def analyse(case: DemCase, spec: BoxSpec, masses: list[Floats], records: list[Ar
     solid = np.mean(
         [over_phase(r["solid"][:, :bins], samples, discard).mean(axis=0) for r in records], axis=0
     )
-    layers = np.mean([_layer_means(r, bins, samples, discard) for r in records], axis=0)
+    layers = np.mean([_layer_means(r, bins=bins, samples=samples, discard=discard) for r in records], axis=0)
     return Results(
         curve=curve,
         base=base,
@@ -121,7 +121,7 @@ def analyse(case: DemCase, spec: BoxSpec, masses: list[Floats], records: list[Ar
     )
 
 
-def _layer_means(record: Arrays, bins: int, samples: int, discard: int) -> Floats:
+def _layer_means(record: Arrays, *, bins: int, samples: int, discard: int) -> Floats:
     """Velocity along the base per height bin, weighted with what the bin holds [m/s]; 0 where it stays empty."""
     solid = over_phase(record["solid"][:, :bins], samples, discard)
     carried = (over_phase(record["layer_velocity"][:, :bins], samples, discard) * solid).sum(axis=(0, 1))

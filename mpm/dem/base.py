@@ -35,7 +35,7 @@ def fit_length(length: float, diameter: float) -> float:
     return max(3, round(length / diameter)) * diameter
 
 
-def frit_monolayer(length: float, depth: float, diameter: float) -> Base:
+def frit_monolayer(*, length: float, depth: float, diameter: float) -> Base:
     """One layer of simple cubic packing with its top at z = 0 (section 3.3.4); length, depth: multiples of d."""
     x = (np.arange(round(length / diameter)) + 0.5) * diameter
     y = (np.arange(round(depth / diameter)) + 0.5) * diameter
@@ -43,14 +43,14 @@ def frit_monolayer(length: float, depth: float, diameter: float) -> Base:
     return Base(grid.reshape(-1, 3), diameter)
 
 
-def sawtooth_baffle(length: float, depth: float, diameter: float, height: float, width: float) -> Base:
+def sawtooth_baffle(*, length: float, depth: float, diameter: float, height: float, width: float) -> Base:
     """A monolayer with one sawtooth: up over `width` along +x, then a vertical fall of `height` (chapter 4).
 
     The face starts where the tooth begins, at (length - width)/2; particles are spaced by their diameter or
     slightly less, so that nothing falls between them.
     """
     start = (length - width) / 2.0
-    floor = frit_monolayer(length, depth, diameter).positions
+    floor = frit_monolayer(length=length, depth=depth, diameter=diameter).positions
     hypotenuse = math.hypot(width, height)
     rise = np.linspace(0.0, 1.0, math.ceil(hypotenuse / diameter) + 1)
     fall = np.linspace(1.0, 0.0, math.ceil(height / diameter) + 1)[1:]
@@ -79,7 +79,7 @@ class Filling:
 
 
 def loose_filling(
-    length: float, depth: float, height: float, diameters: Floats, base: Base, seed: int
+    *, length: float, depth: float, height: float, diameters: Floats, base: Base, seed: int
 ) -> Filling:
     """A jittered lattice above the base that settles to about `height` (at the solid fraction SETTLED).
 

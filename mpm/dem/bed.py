@@ -29,7 +29,7 @@ def bond_numbers(spec: BoxSpec) -> dict[str, float]:
     for name, radius in radii.items():
         real = powder.wall_hamaker if name == "base" else powder.hamaker
         for prefix, hamaker in (("", real * spec.cohesion), ("simulated_", spec.hamaker(name == "base"))):
-            force = largest_force(hamaker, radius, powder.asperity)
+            force = largest_force(hamaker=hamaker, radius=radius, asperity=powder.asperity)
             out[f"{prefix}bond_number_{name}"] = granular_bond_number(
                 cohesion=force, diameter=powder.diameter, density=powder.density
             )

@@ -13,13 +13,11 @@ from mpm.case.settings import parse_settings
 from mpm.errors import InputError
 from mpm.help import HELP_NAMES, App, Verbs
 from mpm.launcher import rank
-from mpm.plain import json_text
 from mpm.screen import screen
 
-from .accelerometer import fit_record, read_record, resample, spectrum
-from .case import load_case
+from .accelerometer import fit_record, read_record
+from .case import DemCase, load_case
 from .idle import idle_keys
-from .waveform import HarmonicWaveform, extension_velocity, peak_displacement
 
 
 class RunByDefault(Verbs):
@@ -87,7 +85,13 @@ def run(
     if rank() == 0 and not quiet:
         for sentence in idle_keys(case):
             typer.echo(f"mpm dem: has no effect: {sentence}", err=True)
+    _simulate(case, directory, jobs, resume=resume, overwrite=overwrite, quiet=quiet)
 
+
+def _simulate(
+    case: DemCase, directory: Path, jobs: int | None, *, resume: bool, overwrite: bool, quiet: bool
+) -> None:
+    """Run all seeds and say what has come out."""
     from .box import load_lammps
 
     load_lammps()
@@ -133,49 +137,13 @@ def waveform(
     waveform.toml is a section for a powder file.
     """
     record = read_record(data, unit)
-    fitted, along, vertical = fit_record(record, harmonics)
+    fit = fit_record(record, harmonics)
     directory = output or Path("results") / data.stem
     directory.mkdir(parents=True, exist_ok=True)
 
-    from mpm.files import write_atomically
+    from .waveform_report import lines, write_fit
 
-    from .report import draw_waveform
-
-    rows = {"horizontal": (fitted.horizontal, along), "vertical": (fitted.vertical, vertical)}
-    report: dict[str, Any] = {
-        "frequency": fitted.frequency,
-        "peak_displacement": dict(zip(("horizontal", "vertical"), peak_displacement(fitted), strict=True)),
-        "extension_velocity": extension_velocity(fitted),
-    }
-    toml = [f'[waveform]\nkind = "harmonics"\nfrequency = "{fitted.frequency!r} Hz"']
-    for name, (terms, fit) in rows.items():
-        report[name] = {
-            "explained_variance": fit.explained,
-            "harmonics": [
-                {
-                    "amplitude": h.amplitude,
-                    "frequency": h.frequency,
-                    "phase": h.phase,
-                    "amplitude_correction": c,
-                }
-                for h, c in zip(terms, fit.correction, strict=True)
-            ],
-        }
-        toml += [
-            f"[[waveform.{name}]]\n"
-            f'amplitude = "{h.amplitude!r} m/s^2"\nfrequency = "{h.frequency!r} Hz"\nphase = "{h.phase!r} rad"'
-            for h in terms
-        ]
-    write_atomically(directory / "waveform.json", json_text(report, "waveform.json"))
-    write_atomically(directory / "waveform.toml", "\n".join(toml) + "\n")
-    unshifted = HarmonicWaveform(along.harmonics, vertical.harmonics, fitted.frequency)
-    spectra = [spectrum(*resample(record.t, row)) for row in record.acceleration]
-    draw_waveform(directory / "waveform.png", (record.t, record.acceleration), unshifted, spectra)
-    typer.echo(f"fundamental {fitted.frequency:.3f} Hz")
-    for name, (terms, fit) in rows.items():
-        typer.echo(f"{name}: {100 * fit.explained:.1f} % of the variance")
-        for h, c in zip(terms, fit.correction, strict=True):
-            typer.echo(
-                f"  {h.amplitude:8.3f} m/s2 at {h.frequency:8.3f} Hz, phase {h.phase:+.3f} rad (FFT amplitude x {c:.3f})"
-            )
+    write_fit(directory, record, fit)
+    for line in lines(fit):
+        typer.echo(line)
     typer.echo(f"written {directory / 'waveform.toml'} (for a powder file), waveform.json, waveform.png")

@@ -14,7 +14,7 @@ TABLE_OVERLAP = (
 )
 
 
-def rumpf_force(separation: Floats, hamaker: float, radius: float, asperity: float) -> Floats:
+def rumpf_force(separation: Floats, *, hamaker: float, radius: float, asperity: float) -> Floats:
     """Attractive force [N] at the surface separation s [m], any shape.
 
     F = A R/(6 s^2) (r/(r + R) + 1/(1 + r/s)^2); R = R1 R2/(R1 + R2) between particles and the particle's own
@@ -29,12 +29,12 @@ def rumpf_force(separation: Floats, hamaker: float, radius: float, asperity: flo
     return np.where(separation <= OUTER_CUTOFF, force, 0.0)
 
 
-def largest_force(hamaker: float, radius: float, asperity: float) -> float:
+def largest_force(*, hamaker: float, radius: float, asperity: float) -> float:
     """The force in contact [N], the numerator of the granular Bond number."""
-    return float(rumpf_force(np.asarray(0.0), hamaker, radius, asperity))
+    return float(rumpf_force(np.asarray(0.0), hamaker=hamaker, radius=radius, asperity=asperity))
 
 
-def reduced_hamaker(hamaker: float, stiffness: float, material_stiffness: float) -> float:
+def reduced_hamaker(*, hamaker: float, stiffness: float, material_stiffness: float) -> float:
     """A_r = A sqrt(k_r/k_m): keeps the work of adhesion over the elastic energy when the spring is softened."""
     softened: float = (stiffness / material_stiffness) ** 0.5
     return hamaker * softened
@@ -47,6 +47,7 @@ def table_points(contact: float, spacing: float = TABLE_SPACING) -> int:
 
 def table_text(
     keyword: str,
+    *,
     contact: float,
     points: int,
     hamaker: float,
@@ -74,7 +75,7 @@ def table_text(
         step = span / max(round((high - kink) / TABLE_SPACING), finer)
         r = np.sqrt(high**2 + step * (index - (points - 1)))
     low = float(r[0])
-    attraction = rumpf_force(r - contact, hamaker, radius, asperity)
+    attraction = rumpf_force(r - contact, hamaker=hamaker, radius=radius, asperity=asperity)
     steps = 0.5 * (attraction[1:] + attraction[:-1]) * np.diff(r)
     energy = -np.append(np.cumsum(steps[::-1])[::-1], 0.0)
     head = f"N {points}" if wall else f"N {points} RSQ {low:.17g} {high:.17g}"

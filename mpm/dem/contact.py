@@ -13,7 +13,7 @@ TANGENTIAL_STIFFNESS = 2.0 / 7.0  # k_t/k_n
 TANGENTIAL_DAMPING = 0.5  # eta_t/eta_n
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Contact:
     """One kind of contact: normal stiffness [N/m], normal restitution, sliding friction."""
 

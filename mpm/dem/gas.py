@@ -22,7 +22,7 @@ from .powder import Powder
 SLAB = 2.5  # height of a slab in mean diameters, the seed's grid of the gas
 
 
-def slab_solids(height: Floats, diameter: Floats, edges: Floats) -> Floats:
+def slab_solids(*, height: Floats, diameter: Floats, edges: Floats) -> Floats:
     """Volume of the spheres (centres at `height`) between consecutive edges [m3], shape (len(edges) - 1,).
 
     The part of a sphere below a level at the fraction t of its diameter is t^2 (3 - 2 t).
@@ -32,7 +32,7 @@ def slab_solids(height: Floats, diameter: Floats, edges: Floats) -> Floats:
     return np.diff(below.sum(axis=0))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GasDrag:
     """Gas of `viscosity` [Pa s] and `density` [kg/m3], aerated at the superficial `velocity` [m/s].
 
@@ -56,6 +56,7 @@ class GasDrag:
 
     def coefficients(
         self,
+        *,
         height: Floats,
         relative: Floats,
         diameter: Floats,

@@ -77,7 +77,12 @@ def _pair_cohesion(spec: BoxSpec, folder: Path, styles: list[str]) -> Interactio
     for i, j, a, b, wall in pairs:
         path = folder / f"pair_{i}_{j}.table"
         tables[path] = cohesion.table_text(
-            KEYWORD, a + b, points, spec.hamaker(wall), a * b / (a + b), spec.powder.asperity
+            KEYWORD,
+            contact=a + b,
+            points=points,
+            hamaker=spec.hamaker(wall),
+            radius=a * b / (a + b),
+            asperity=spec.powder.asperity,
         )
         cutoff = a + b + cohesion.OUTER_CUTOFF
         commands.append(f'pair_coeff {i + 1} {j + 1} table "{path}" {KEYWORD} {cutoff:.17g}')
@@ -94,7 +99,13 @@ def _wall(spec: BoxSpec, folder: Path) -> Interactions:
         path = folder / f"wall_{i}.table"
         points = cohesion.table_points(radius, cohesion.TABLE_SPACING / 2.0)
         tables[path] = cohesion.table_text(
-            KEYWORD, radius, points, spec.hamaker(True), radius, spec.powder.asperity, wall=True
+            KEYWORD,
+            contact=radius,
+            points=points,
+            hamaker=spec.hamaker(True),
+            radius=radius,
+            asperity=spec.powder.asperity,
+            wall=True,
         )
         commands += [
             f"group class{i} type {i}",

@@ -14,7 +14,7 @@ from ..constants import GRAVITY
 SMALLEST = 0.2  # of the mean diameter: the smallest class; its collisions set the time step
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Powder:
     """Particles and what they do on contact with each other and with the base (SI).
 
@@ -87,18 +87,18 @@ POWDERS: dict[str, Powder] = {
     powder.name: powder
     for powder in (
         Powder(
-            "GL50", 50e-6, 0.0, 2500.0, 0.79,
+            name="GL50", diameter=50e-6, deviation=0.0, density=2500.0, sphericity=0.79,
             source="table 2.1 (sieve cut 45-63 um, simulated as one size); sphericity assumed that of GL56",
         ),
-        Powder("GL29", 29e-6, 8.1e-6, 2500.0, 0.78, measured_umf=0.175e-2, source=_GLASS),
-        Powder("GL56", 56e-6, 13.9e-6, 2500.0, 0.79, measured_umf=0.35e-2, source=_GLASS),
+        Powder(name="GL29", diameter=29e-6, deviation=8.1e-6, density=2500.0, sphericity=0.78, measured_umf=0.175e-2, source=_GLASS),
+        Powder(name="GL56", diameter=56e-6, deviation=13.9e-6, density=2500.0, sphericity=0.79, measured_umf=0.35e-2, source=_GLASS),
         Powder(
-            "GL223", 223e-6, 53.5e-6, 2500.0, 0.80, wall_friction=0.42, hamaker=0.0, wall_hamaker=0.0,
-            measured_umf=5e-2, source=_COARSE,
+            name="GL223", diameter=223e-6, deviation=53.5e-6, density=2500.0, sphericity=0.80,
+            wall_friction=0.42, hamaker=0.0, wall_hamaker=0.0, measured_umf=5e-2, source=_COARSE,
         ),
         Powder(
-            "SS231", 231e-6, 64.2e-6, 7500.0, 0.81, wall_friction=0.42, hamaker=0.0, wall_hamaker=0.0,
-            ergun=(248.0, 1.75), measured_umf=10e-2,
+            name="SS231", diameter=231e-6, deviation=64.2e-6, density=7500.0, sphericity=0.81,
+            wall_friction=0.42, hamaker=0.0, wall_hamaker=0.0, ergun=(248.0, 1.75), measured_umf=10e-2,
             source="sizes: table 3.2; Ergun's A: section 3.4.2; contact values assumed those of glass",
         ),
     )

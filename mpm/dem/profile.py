@@ -17,7 +17,7 @@ SINE = 0.02
 """Share of its amplitude by which a displacement may differ from a sine: what a reactor that vibrates in one would not notice."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Profile:
     """Lab-frame velocity of the bed over one cycle at n equidistant phases from 0.
 
@@ -112,7 +112,7 @@ def _piecewise(curve: Profile, base: Floats, start: int, length: int, mean: floa
     rms = float(np.sqrt(((velocity[0] - curve.velocity[0]) ** 2).mean()))
     # the change happens between two samples
     liftoff, contact = ((start - 0.5) * step) % 360.0, ((start + length - 0.5) * step) % 360.0
-    profile = Profile(curve.phase, velocity, (~flying).astype(float))
+    profile = Profile(phase=curve.phase, velocity=velocity, contact=(~flying).astype(float))
     return PiecewiseFit(liftoff, contact, flight, rms, profile)
 
 

@@ -17,7 +17,7 @@ from .analysis import Results
 from .case import DemCase
 from .profile import conditions, scaled_to_mean
 from .spec import BoxSpec, Particles
-from .waveform import HarmonicWaveform, Waveform
+from .waveform import Waveform
 
 BASE, BED, FIT = "#0072B2", "#D55E00", "#009E73"  # Okabe and Ito: stay apart for colour-blind readers
 
@@ -232,37 +232,3 @@ def _bed(spec: BoxSpec, particles: Particles) -> Figure:
     )
     axis.set(xlabel="x [mm]", ylabel="z [mm]", aspect="equal")
     return figure
-
-
-def draw_waveform(
-    path: Path,
-    record: tuple[Floats, Floats],
-    fit: HarmonicWaveform,
-    spectra: list[tuple[Floats, Floats]],
-) -> None:
-    """Four cycles of accelerometer data with the fitted harmonics, the spectra, and the displacements.
-
-    `fit` has the clock of the record.
-    """
-    t, acceleration = record
-    span = 4.0 / fit.frequency
-    smooth = np.linspace(0.0, span, 800)
-    figure = Figure(figsize=(9.0, 5.5), layout="constrained")
-    axes = figure.subplots(2, 3)
-    for row, name in enumerate(("along", "vertical")):
-        data, lines, moved = axes[row]
-        data.plot(1e3 * t[t < span], acceleration[row, t < span], ".", ms=3, color=BASE, label="data")
-        data.plot(1e3 * smooth, fit.acceleration(smooth)[row], color=BED, lw=1.0, label="fit")
-        data.set(xlabel="t [ms]", ylabel=f"acceleration {name} [m/s²]")
-        frequency, amplitude = spectra[row]
-        lines.plot(frequency, amplitude, color=BASE, lw=0.8, label="FFT")
-        terms = (fit.horizontal, fit.vertical)[row]
-        lines.plot(
-            [h.frequency for h in terms], [h.amplitude for h in terms], "o", color=BED, ms=4, label="fit"
-        )
-        lines.set(xlabel="frequency [Hz]", ylabel="amplitude [m/s²]", xlim=(0, min(frequency[-1], 500)))
-        moved.plot(1e3 * smooth, 1e6 * fit.displacement(smooth)[row], color=FIT)
-        moved.set(xlabel="t [ms]", ylabel=f"displacement {name} [µm]")
-    for axis in axes[0, :2]:
-        axis.legend(frameon=False)
-    write_picture(path, figure, dpi=150)

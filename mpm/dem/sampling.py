@@ -42,7 +42,9 @@ def count_contacts(spec: BoxSpec, particles: Particles) -> tuple[int, int, float
     period = [spec.length, spec.depth, 0.0]
     tree = cKDTree(position, boxsize=period)
     pairs = tree.query_pairs(float(2.0 * radius.max()), output_type="ndarray")
-    touching, worst = _touch(position[pairs[:, 0]], position[pairs[:, 1]], radius[pairs].sum(axis=1), size)
+    touching, worst = _touch(
+        position[pairs[:, 0]], position[pairs[:, 1]], contact=radius[pairs].sum(axis=1), size=size
+    )
     if spec.base.flat:
         on_base = position[:, 2] < radius
     else:
@@ -55,7 +57,7 @@ def count_contacts(spec: BoxSpec, particles: Particles) -> tuple[int, int, float
     return int(touching), int(on_base.sum()), worst
 
 
-def _touch(a: Floats, b: Floats, contact: Floats, size: Floats) -> tuple[int, float]:
+def _touch(a: Floats, b: Floats, *, contact: Floats, size: Floats) -> tuple[int, float]:
     offset = a - b
     offset[:, :2] -= size * np.round(offset[:, :2] / size)
     overlap = 1.0 - np.linalg.norm(offset, axis=1) / contact
@@ -125,7 +127,7 @@ class Recorder:
             )
         self.data["pairs"].append(pairs / len(diameter))
         self.data["on_base"].append(on_base / len(diameter))
-        solids = slab_solids(particles.position[:, 2], diameter, self.edges)
+        solids = slab_solids(height=particles.position[:, 2], diameter=diameter, edges=self.edges)
         self.data["solid"].append(solids / (spec.length * spec.depth * np.diff(self.edges)))
         index = np.clip(np.digitize(particles.position[:, 2], self.edges) - 1, 0, len(self.edges) - 2)
         weight = np.bincount(index, mass, len(self.edges) - 1)

@@ -49,7 +49,9 @@ def build(case: DemCase, seed: int) -> tuple[BoxSpec, Filling]:
     if options.base != "flat":
         length, depth = (fit_length(size, options.frit_diameter) for size in (length, depth))
         base = _glued(case, length, depth)
-    filling = loose_filling(length, depth, options.height * d, diameters, base, seed)
+    filling = loose_filling(
+        length=length, depth=depth, height=options.height * d, diameters=diameters, base=base, seed=seed
+    )
     thrown = fastest(case.build_waveform(), 1.0) ** 2 / (2.0 * GRAVITY)
     spec = BoxSpec(
         powder=powder,
@@ -74,8 +76,14 @@ def fastest(waveform: Waveform, span: float) -> float:
 def _glued(case: DemCase, length: float, depth: float) -> Base:
     options = case.box
     if options.base == "frit":
-        return frit_monolayer(length, depth, options.frit_diameter)
-    return sawtooth_baffle(length, depth, options.frit_diameter, options.baffle_height, options.baffle_width)
+        return frit_monolayer(length=length, depth=depth, diameter=options.frit_diameter)
+    return sawtooth_baffle(
+        length=length,
+        depth=depth,
+        diameter=options.frit_diameter,
+        height=options.baffle_height,
+        width=options.baffle_width,
+    )
 
 
 def stored_particles(state: Stored) -> Particles:
@@ -101,7 +109,13 @@ class Simulation:
         self.gas = (
             None
             if gas is None
-            else GasDrag(powder, gas.viscosity, gas.density, gas.velocity, gas.frame == "lab")
+            else GasDrag(
+                powder=powder,
+                viscosity=gas.viscosity,
+                density=gas.density,
+                velocity=gas.velocity,
+                rests_in_lab=gas.frame == "lab",
+            )
         )
         drop = math.sqrt(2.0 * GRAVITY * case.box.height * powder.diameter)
         limit = TOO_FAST * (fastest(self.waveform, self.period) + drop)
@@ -202,12 +216,18 @@ class Simulation:
         height, velocity, diameter = box.local_bed()
         bed = box.local_is_bed()
         edges = gas.edges(self.spec.height)
-        solid = slab_solids(height[bed], diameter[bed], edges)
+        solid = slab_solids(height=height[bed], diameter=diameter[bed], edges=edges)
         if self.comm is not None:
             solid = self.comm.allreduce(solid)
         solid = solid / (self.spec.length * self.spec.depth * np.diff(edges))
         gamma = np.zeros(len(height))
-        gamma[bed] = gas.coefficients(height[bed], flux - velocity[bed], diameter[bed], edges, solid)
+        gamma[bed] = gas.coefficients(
+            height=height[bed],
+            relative=flux - velocity[bed],
+            diameter=diameter[bed],
+            edges=edges,
+            solid=solid,
+        )
         box.set_drag(gamma, flux)
 
     # State ----------------------------------------------------------------------------------------

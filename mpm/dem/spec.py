@@ -33,11 +33,17 @@ class BoxSpec:
 
     @property
     def pair_contact(self) -> Contact:
-        return Contact(self.stiffness, self.powder.restitution, self.powder.friction)
+        return Contact(
+            stiffness=self.stiffness, restitution=self.powder.restitution, friction=self.powder.friction
+        )
 
     @property
     def wall_contact(self) -> Contact:
-        return Contact(self.stiffness, self.powder.wall_restitution, self.powder.wall_friction)
+        return Contact(
+            stiffness=self.stiffness,
+            restitution=self.powder.wall_restitution,
+            friction=self.powder.wall_friction,
+        )
 
     @property
     def equal_sizes(self) -> bool:
@@ -63,7 +69,9 @@ class BoxSpec:
         value = self.powder.wall_hamaker if wall else self.powder.hamaker
         if not self.reduced:
             return value
-        return cohesion.reduced_hamaker(value, self.stiffness, self.powder.stiffness)
+        return cohesion.reduced_hamaker(
+            hamaker=value, stiffness=self.stiffness, material_stiffness=self.powder.stiffness
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,11 +6,10 @@ and is placed so that the vertical fundamental passes zero upwards at t = 0.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from mpm.arrays import Floats
 
@@ -29,7 +28,7 @@ class Waveform(Protocol):
     def acceleration(self, t: Floats) -> Floats: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Harmonic:
     """One term A cos(2 pi f t - phi) of an acceleration (2-7): A [m/s2], f [Hz], phi [rad]."""
 
@@ -46,6 +45,11 @@ class HarmonicWaveform:
     vertical: tuple[Harmonic, ...]
     frequency: float
 
+    @property
+    def rows(self) -> tuple[tuple[Harmonic, ...], tuple[Harmonic, ...]]:
+        """Harmonics along the conveyor and vertical."""
+        return self.horizontal, self.vertical
+
     def acceleration(self, t: Floats) -> Floats:
         """x'' = sum A cos(w t - phi) (2-7)."""
         return self._sum(t, lambda h, arg, w: h.amplitude * np.cos(arg))
@@ -61,7 +65,7 @@ class HarmonicWaveform:
     def _sum(self, t: Floats, term: Callable[[Harmonic, Floats, float], Floats]) -> Floats:
         t = np.atleast_1d(np.asarray(t, dtype=float))
         out = np.zeros((2, t.size))
-        for row, harmonics in enumerate((self.horizontal, self.vertical)):
+        for row, harmonics in enumerate(self.rows):
             for h in harmonics:
                 w = 2.0 * math.pi * h.frequency
                 out[row] += term(h, w * t - h.phase, w)
@@ -72,8 +76,7 @@ class HarmonicWaveform:
 
         def shift(harmonics: tuple[Harmonic, ...]) -> tuple[Harmonic, ...]:
             return tuple(
-                Harmonic(h.amplitude, h.frequency, _wrap(h.phase - 2.0 * math.pi * h.frequency * t0))
-                for h in harmonics
+                replace(h, phase=_wrap(h.phase - 2.0 * math.pi * h.frequency * t0)) for h in harmonics
             )
 
         return HarmonicWaveform(shift(self.horizontal), shift(self.vertical), self.frequency)
@@ -91,12 +94,12 @@ class HarmonicWaveform:
         """All accelerations times `factor` (e.g. 0.7/1.05 for the seed's 0.7 g cases)."""
 
         def scale(harmonics: tuple[Harmonic, ...]) -> tuple[Harmonic, ...]:
-            return tuple(Harmonic(factor * h.amplitude, h.frequency, h.phase) for h in harmonics)
+            return tuple(replace(h, amplitude=factor * h.amplitude) for h in harmonics)
 
         return HarmonicWaveform(scale(self.horizontal), scale(self.vertical), self.frequency)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Sawtooth:
     """The pseudo-sawtooth (2-10 ... 2-12): a slow half sine out, a fast one back, equal displacements.
 
@@ -141,14 +144,18 @@ class Sawtooth:
         return np.array([[self.horizontal], [self.vertical]]) * shape
 
 
-def sine(gamma: float, frequency: float, angle: float, angle_from: str = "horizontal") -> HarmonicWaveform:
+def sine(*, gamma: float, frequency: float, angle: float, angle_from: str = "horizontal") -> HarmonicWaveform:
     """A pure sine whose vertical acceleration is gamma g; displacement (X, Z) sin(w t).
 
     `angle` [rad] from the horizontal (Z/X = tan angle) or from the vertical (X/Z = tan angle).
     """
     vertical = gamma * GRAVITY
     horizontal = vertical / math.tan(angle) if angle_from == "horizontal" else vertical * math.tan(angle)
-    return HarmonicWaveform((Harmonic(horizontal, frequency),), (Harmonic(vertical, frequency),), frequency)
+    return HarmonicWaveform(
+        (Harmonic(amplitude=horizontal, frequency=frequency),),
+        (Harmonic(amplitude=vertical, frequency=frequency),),
+        frequency,
+    )
 
 
 def from_table(
@@ -159,6 +166,8 @@ def from_table(
     Samples may be uneven; the last sample may repeat the first. A mean acceleration cannot belong to a periodic
     motion and is dropped. `frequency` defaults to 1/(t[-1] - t[0]) of a table that closes.
     """
+    from scipy.interpolate import CubicSpline  # which takes a second to load
+
     t = np.asarray(t, dtype=float)
     acceleration = np.asarray(acceleration, dtype=float)
     period = 1.0 / frequency if frequency else float(t[-1] - t[0])
@@ -172,7 +181,11 @@ def from_table(
         spectrum = np.fft.rfft(CubicSpline(closed, np.append(row, row[0]), bc_type="periodic")(even)) / n
         rows.append(
             tuple(
-                Harmonic(2.0 * abs(spectrum[m]), m / period, _wrap(-np.angle(spectrum[m])))
+                Harmonic(
+                    amplitude=2.0 * abs(spectrum[m]),
+                    frequency=m / period,
+                    phase=_wrap(-np.angle(spectrum[m])),
+                )
                 for m in range(1, harmonics + 1)
                 if abs(spectrum[m]) > 1e-9
             )
@@ -200,11 +213,11 @@ def seed_table_2_2() -> HarmonicWaveform:
     2Z 10.114 (192 Hz, -2.66). 3Z 9.154 m/s2 at 167 Hz, -1.38 rad is an inference.
     """
     return HarmonicWaveform(
-        horizontal=(Harmonic(10.581, 48.0, 3.08),),
+        horizontal=(Harmonic(amplitude=10.581, frequency=48.0, phase=3.08),),
         vertical=(
-            Harmonic(10.273, 48.0, 3.08),
-            Harmonic(10.114, 192.0, -2.66),
-            Harmonic(9.154, 167.0, -1.38),
+            Harmonic(amplitude=10.273, frequency=48.0, phase=3.08),
+            Harmonic(amplitude=10.114, frequency=192.0, phase=-2.66),
+            Harmonic(amplitude=9.154, frequency=167.0, phase=-1.38),
         ),
         frequency=48.0,
     ).aligned()

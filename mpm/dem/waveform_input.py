@@ -32,7 +32,7 @@ class SineInput(Frozen):
     """what the angle is counted from"""
 
     def build(self, directory: Path) -> Waveform:
-        return sine(self.gamma, self.frequency, self.angle, self.angle_from)
+        return sine(gamma=self.gamma, frequency=self.frequency, angle=self.angle, angle_from=self.angle_from)
 
 
 class SawtoothInput(Frozen):
@@ -52,11 +52,11 @@ class SawtoothInput(Frozen):
     """frequency of the slow half sine out over that of the cycle, f_a / f_1"""
 
     def build(self, directory: Path) -> Waveform:
-        like = sine(self.gamma, self.frequency, self.angle, self.angle_from)
+        like = sine(gamma=self.gamma, frequency=self.frequency, angle=self.angle, angle_from=self.angle_from)
         x, z = (
             h[0].amplitude / (2.0 * math.pi * self.frequency) ** 2 for h in (like.horizontal, like.vertical)
         )
-        return Sawtooth(x, z, self.frequency, self.extension_ratio)
+        return Sawtooth(horizontal=x, vertical=z, frequency=self.frequency, ratio=self.extension_ratio)
 
 
 class SeedInput(Frozen):
@@ -102,7 +102,7 @@ class HarmonicsInput(Frozen):
 
     def build(self, directory: Path) -> Waveform:
         horizontal, vertical = (
-            tuple(Harmonic(h.amplitude, h.frequency, h.phase) for h in row)
+            tuple(Harmonic(amplitude=h.amplitude, frequency=h.frequency, phase=h.phase) for h in row)
             for row in (self.horizontal, self.vertical)
         )
         return HarmonicWaveform(horizontal, vertical, self.frequency).aligned()
