@@ -8,7 +8,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from mpm.case.case import case_schema
+from mpm.case.case import case_schema, load_case
 from mpm.case.chemistry import mechanism_schema
 from mpm.cli import main
 from mpm.dem.case import DemCase, powder_schema
@@ -83,6 +83,17 @@ def test_what_an_editor_should_mark(kind: str, old: str, new: str) -> None:
     assert old in text
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(tomllib.loads(text.replace(old, new)), SCHEMAS[kind]())
+
+
+def test_a_case_may_override_one_key_of_its_mechanism() -> None:
+    """Fails when the schema of a case marks an entry as incomplete that the mechanism's file completes."""
+    path = ROOT / "cases" / "single_zone.toml"
+    changes = {
+        "chemistry": {"reaction": {"tma": {"A": "0.8 m/s"}}, "species": {"TMA": {"molar_mass": "72 g/mol"}}}
+    }
+    jsonschema.validate(tomllib.loads(path.read_text(encoding="utf-8")) | changes, SCHEMAS["case"]())
+    keys = {"chemistry.reaction.tma.A": "0.8 m/s", "chemistry.species.TMA.molar_mass": "72 g/mol"}
+    assert load_case(path, keys).mechanism.get("TMA").molar_mass == pytest.approx(0.072)
 
 
 def test_schemas_know_the_keys_that_are_read() -> None:
