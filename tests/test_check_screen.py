@@ -112,6 +112,17 @@ def test_the_numbers_of_an_engineer_are_those_of_the_report() -> None:
         assert shown is not None and float(shown[1]) == pytest.approx(value, rel=2e-3), label
 
 
+def test_species_that_diffuse_alike_share_a_line() -> None:
+    """Fails when one diffusivity of all species names them, or one of several does not."""
+    together = words(load_case("single_cycle"))
+    assert " diffusivity 2.88e-5 m^2/s" in together and "diffusivity of" not in together
+    apart = words(load_case("single_cycle", {"gas.diffusivity": {"TMA": "1e-5 m^2/s"}}))
+    assert (
+        " diffusivity of TMA 1e-5 m^2/s" in apart
+        and " diffusivity of H2O, CH4, Al(OH)3 2.88e-5 m^2/s" in apart
+    )
+
+
 def test_the_hundredth_and_the_standard_flow() -> None:
     """n_s N_A = 0.0417 per nm2 against 1/0.24 per nm2, and q T0 p/(T p0): 4 mm at 3.5 cm/s and 473 K are 4.85 standard litres a minute."""
     assert sites_per_square_nanometre(6.92e-8) == pytest.approx(0.01 / 0.24, rel=2e-3)

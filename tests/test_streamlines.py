@@ -8,7 +8,7 @@ import pytest
 
 from mpm.case.case import load_case
 from mpm.mesh.grid import Grid
-from mpm.pictures.streamlines import stream_function, stream_levels
+from mpm.pictures.streamlines import LINES, stream_function, stream_levels
 
 
 def grid(**changes: object) -> Grid:
@@ -95,5 +95,7 @@ def test_levels_divide_the_flow_and_keep_off_the_walls() -> None:
     on_walls = np.array([0.0, -1e-4])  # of the bottom wall, left and right of the slot
     assert np.abs(levels[:, None] - on_walls).min() > 0.4 * spacing[0]
     assert len(stream_levels(strip, np.zeros_like(psi))) == 0
+    closed = replace(strip, periodic=False)  # nothing has to meet at the ends
+    assert np.diff(stream_levels(closed, psi))[0] == pytest.approx(np.ptp(psi) / LINES)
     eight_zones = replace(strip, zone_of_column=np.full(strip.columns, 8))
     assert len(stream_levels(eight_zones, psi)) == pytest.approx(4 * len(levels), rel=0.1)
