@@ -29,6 +29,7 @@ import psutil
 from meshes import rows
 from mpm.case.case import Case, load_case
 from mpm.output.history import History
+from mpm.report.trees import flatten
 
 ROOT = Path(__file__).parents[1]
 TOLERANCE = 1e-10  # of the largest value of a column; balances, which are rounding, absolute
@@ -97,15 +98,6 @@ def numbers(summary: dict[str, Any]) -> str:
     return json.dumps({key: value for key, value in summary.items() if key not in BOOKKEEPING})
 
 
-def flat(value: Any, name: str = "") -> dict[str, float]:
-    """Numbers of a summary by dotted name."""
-    if isinstance(value, dict):
-        return {k: v for key, item in value.items() for k, v in flat(item, f"{name}.{key}").items()}
-    if isinstance(value, list):
-        return {k: v for i, item in enumerate(value) for k, v in flat(item, f"{name}.{i}").items()}
-    return {} if isinstance(value, str) else {name: float(value)}
-
-
 def difference(one: Path, other: Path) -> float:
     """Largest difference of two runs' histories and summaries, see TOLERANCE; infinite when they differ in kind."""
     a, b = (History(folder / "history.csv").by_column() for folder in (one, other))
@@ -118,13 +110,13 @@ def difference(one: Path, other: Path) -> float:
         scale = 1.0 if name.startswith("balance.") else max(float(np.nanmax(np.abs(values))), 1e-300)
         worst = max(worst, float(np.nanmax(np.abs(values - b[name]))) / scale)
     x, y = (json.loads((folder / "summary.json").read_text(encoding="utf-8")) for folder in (one, other))
-    p, q = (flat({k: v for k, v in s.items() if k not in BOOKKEEPING}) for s in (x, y))
+    p, q = (flatten({k: v for k, v in s.items() if k not in BOOKKEEPING}) for s in (x, y))
     if p.keys() != q.keys():
         return float("inf")
     feed = max(entry["fed"] for entry in x["species"].values())
     for name, value in p.items():
         error = name.endswith("error")
-        scale = 1.0 if error else max(abs(value), 1e-6 * feed if name.startswith(".species.") else 1e-9)
+        scale = 1.0 if error else max(abs(value), 1e-6 * feed if name.startswith("species.") else 1e-9)
         worst = max(worst, abs(value - q[name]) / scale)
     return worst
 
