@@ -23,6 +23,7 @@ from mpm.parallel import largest
 Floats = NDArray[np.float64]
 PERIODIC = 1e-6  # change of the velocities from one cycle to the next, relative to the fastest
 CYCLE_LIMIT = 200
+MEAN_TOLERANCE = 1e-3  # of the correction of a mean, which leaves a third of what the cycle lacks in any case
 
 
 def cycle_motions(bed_motion: BedMotion, dt: float, phases: int) -> list[StepMotion]:
@@ -90,7 +91,7 @@ def periodic_flow(
         with suppress(
             ConvergenceError
         ):  # of a flow that is about to diverge, which the next cycle tells better
-            problem.newton_update(mean, convective_mean)
+            problem.newton_update(mean, convective_mean, tolerance=MEAN_TOLERANCE)
         problem.values[:] += (
             last - state_mean
         )  # the mean corrected; the last phase keeps its distance from it

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
 
 Floats = NDArray[np.float64]
-NEWTON_TOLERANCE = 1e-6  # of the inner iteration of a Newton update
+NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
 Ports = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
 CLOSED_PORTS: Ports = (0.0, 0.0)
 
@@ -175,12 +175,16 @@ class FlowProblem:
         self.state.x.scatter_forward()
 
     def newton_update(
-        self, motion: StepMotion, convective: PETSc.Vec | None = None, exact: bool = False
+        self,
+        motion: StepMotion,
+        convective: PETSc.Vec | None = None,
+        exact: bool = False,
+        tolerance: float = NEWTON_TOLERANCE,
     ) -> float:
         """One Newton step on the steady equations at the state's ports; returns the largest change of a velocity over the largest velocity.
 
         N is the convective force of the state unless another one is given, as the mean of a cycle is. The Jacobian, A + dN/du, is solved by
-        GMRES with the factor of A as preconditioner; `exact` makes a factor of the Jacobian itself. Raises ConvergenceError.
+        GMRES to `tolerance` with the factor of A as preconditioner; `exact` makes a factor of the Jacobian itself. Raises ConvergenceError.
         """
         self.weigh(motion, convective)
         if self._psi.size == 0:
@@ -191,7 +195,7 @@ class FlowProblem:
             solver.solve(self._rhs, self._psi)
             solver.destroy()
         else:
-            self._iterate()
+            self._iterate(tolerance)
         self._adopt()
         change = self.space.fastest(self._work.array)
         change, fastest = largest(self.strip.comm, [change, self.space.fastest(self.values)])
@@ -208,14 +212,14 @@ class FlowProblem:
         whole.axpy(1.0, self.viscous)
         return whole.ptap(self.space.curl)
 
-    def _iterate(self) -> None:
+    def _iterate(self, tolerance: float) -> None:
         """Solve Z^T (A + dN/du) Z psi = rhs by GMRES, on the right preconditioned with the factor of Z^T A Z."""
         steady = self._solver("steady")
         jacobian = PETSc.Mat().createPython(steady.matrix.getSizes(), _Jacobian(self), self.strip.comm)
         ksp = PETSc.KSP().create(self.strip.comm)
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        ksp.setTolerances(rtol=NEWTON_TOLERANCE, atol=0.0, max_it=200)
+        ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=200)
         ksp.setPC(steady.ksp.getPC())
         ksp.setOperators(jacobian, steady.matrix)
         ksp.setGMRESRestart(30)
