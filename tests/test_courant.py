@@ -38,6 +38,9 @@ def test_courant_number_of_plug_flow() -> None:
     upwards[[0, 3]] = 0.03
     assert courant_number(strip, upwards, 0.01) == pytest.approx(0.03 * 0.01 / 0.5 / 1e-3, rel=1e-12)
     assert driving_speed(case) == pytest.approx(0.03)
+    aslant = upwards.copy()
+    aslant[1] = 0.02  # in through the left side
+    assert courant_number(strip, aslant, 0.01) == pytest.approx((0.03 + 0.02) * 0.01 / 0.5 / 1e-3, rel=1e-12)
 
 
 def assert_finite(folder: Path) -> None:

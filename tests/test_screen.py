@@ -21,7 +21,7 @@ from mpm.cli import main
 from mpm.cli.nextsteps import how_to_go_on
 from mpm.errors import BalanceError, ConvergenceError, InputError, Interrupted
 from mpm.reactor.clock import Clock
-from mpm.reactor.progress import Progress
+from mpm.reactor.progress import FLOW, Progress
 from mpm.report.tables import print_mesh, print_summary
 from mpm.screen import Listing, duration, screen
 
@@ -226,6 +226,17 @@ def test_the_live_line_fits() -> None:
     line = progress.line()
     assert line.startswith("1234.6 of 20000 s, step 114812, 14.8 steps/s, 7 d 17 h left, balances to 3e-13")
     assert len(line) <= 78
+
+
+def test_a_log_is_not_filled_before_the_first_step(capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when every cycle of a flow that is being found takes a line of a log, or the beginning of it none."""
+    progress = Progress(Clock(end=1.0, all_steps=1), MPI.COMM_SELF, True)
+    for text in (FLOW, "cycle 1", "cycle 2"):
+        progress.say(text)
+    assert capsys.readouterr().err == f"{FLOW}\n"
+    progress.interval = 0.0
+    progress.say("cycle 3")
+    assert capsys.readouterr().err == "cycle 3\n"
 
 
 def test_a_finished_run_names_the_next_steps(

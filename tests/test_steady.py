@@ -18,6 +18,7 @@ from mpm.output.results import load_run
 from mpm.physics.exponentials import phi1, phi2
 from mpm.reactor.flow import Flow
 from mpm.reactor.reactor import Reactor
+from mpm.reactor.steady.coarsening import coarser
 
 from .cases import (
     CASES,
@@ -219,6 +220,19 @@ def test_nothing_fed_is_nothing_lost() -> None:
     assert summary["species"]["TMA"]["fed"] == 0.0 and summary["species"]["TMA"]["balance_error"] < 1e-12
     assert all(entry["balance_error"] < 1e-12 for entry in summary["elements"].values())
     assert "utilisation" not in summary and "mass_error" not in summary["flow"]
+
+
+def test_a_coarser_mesh_has_half_the_columns_and_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when a layer loses more than half its rows, or its last two, or a small mesh is made coarser still."""
+    monkeypatch.setattr(mpm.reactor.steady.coarsening, "FEWEST", 200)
+    case = zone({"geometry.layer.bed.cells": 7, "geometry.layer.frit.cells": 3})
+    coarse = coarser(case)
+    assert coarse is not None and coarse.geometry.columns == case.geometry.columns // 2
+    rows = {layer.name: layer.cells for layer in coarse.geometry.layers}
+    assert rows == {"plenum": 2, "frit": 2, "bed": 4, "headspace": 4}
+    coarsest = coarser(coarse)
+    assert coarsest is not None and min(layer.cells for layer in coarsest.geometry.layers) == 2
+    assert coarser(coarsest) is None
 
 
 @pytest.mark.parallel
