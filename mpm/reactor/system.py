@@ -114,7 +114,8 @@ class System:
         try:
             velocity = self.flow.sequence.at(step)
             self.coverage.slide(self._slide(step))
-            self.transport.advance(self.operators(velocity, step.phase == RESTING), step.t0, step.dt)
+            operators = self.operators(velocity, step.phase == RESTING)
+            self.transport.advance(operators, step.t0, step.dt, self.schedule.recurs(step))
         except ConvergenceError as error:
             self.coverage.recall(before)
             raise ConvergenceError(f"step {step.index + 1}: {error}") from error

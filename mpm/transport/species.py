@@ -124,21 +124,24 @@ class Transport:
 
     # --- one step ---
 
-    def advance(self, operators: Operators, t0: float, dt: float, halvings: int = 0) -> None:
+    def advance(
+        self, operators: Operators, t0: float, dt: float, recurs: bool = False, halvings: int = 0
+    ) -> None:
         """Advance concentrations, coverage and ledger from `t0` by `dt` [s] in the velocity field of `operators`; collective.
 
-        A step whose Newton iteration fails is halved, up to HALVINGS times. Raises ConvergenceError after that.
+        Steps that `recurs` are many with the same operators and the same `dt`. A step whose Newton iteration fails is halved, up to
+        HALVINGS times. Raises ConvergenceError after that.
         """
         before = self.concentration, self.coverage.memento(), self.ledger.memento()
         try:
-            self._advance(operators, t0, dt)
+            self._advance(operators, t0, dt, recurs)
         except ConvergenceError as error:
             self._recall(*before)
             if halvings == HALVINGS:
                 raise ConvergenceError(f"t = {t0:.6g} s, step of {dt:.3g} s: {error}") from error
             try:
-                self.advance(operators, t0, 0.5 * dt, halvings + 1)
-                self.advance(operators, t0 + 0.5 * dt, 0.5 * dt, halvings + 1)
+                self.advance(operators, t0, 0.5 * dt, halvings=halvings + 1)
+                self.advance(operators, t0 + 0.5 * dt, 0.5 * dt, halvings=halvings + 1)
             except ConvergenceError:
                 self._recall(*before)
                 raise
@@ -148,7 +151,7 @@ class Transport:
         self.coverage.recall(coverage)
         self.ledger.recall(ledger)
 
-    def _advance(self, operators: Operators, t0: float, dt: float) -> None:
+    def _advance(self, operators: Operators, t0: float, dt: float, recurs: bool) -> None:
         old, coupled = self.concentration, self.coupled
         drawn = self.ports.outlet_means(operators, old)
         shares = self.ports.shares(t0, dt)
@@ -164,9 +167,8 @@ class Transport:
         for i in range(coupled, len(self.names)):
             matrix = self._linear[self._group[i]]
             matrix.update(operators[i], dt)
-            new[i] = matrix.solve(
-                storage * old[i] + supply[i] + made[i], old[i], self.ports.feed_rate * RESIDUAL
-            )
+            rhs = storage * old[i] + supply[i] + made[i]
+            new[i] = matrix.solve(rhs, old[i], self.ports.feed_rate * RESIDUAL, recurs)
         self.concentration = new
         self.ledger.book(self.ports, operators, new, dt, shares, drawn, events)
 
