@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from mpm.arrays import Floats
+from mpm.constants import GRAVITY
 from mpm.errors import InputError
 from mpm.files import read_text
 
-from ..constants import GRAVITY
 from .waveform import Harmonic, HarmonicWaveform
 
 NOISE = (

@@ -9,7 +9,6 @@ from mpm.physics.fluidisation import (
     wen_yu_minimum_fluidisation,
 )
 
-from ..constants import GRAVITY
 from .case import DemCase
 from .cohesion import largest_force
 from .spec import BoxSpec
@@ -64,5 +63,5 @@ def bed_numbers(case: DemCase, spec: BoxSpec, heights: Floats, solid: Floats) ->
         out["minimum_fluidisation_wen_yu"] = wen_yu_minimum_fluidisation(
             diameter=d, density_solid=powder.density, viscosity=gas.viscosity, density_gas=gas.density
         )
-    out["weight_of_a_particle"] = powder.mass * GRAVITY
+    out["weight_of_a_particle"] = powder.weight
     return out

@@ -7,9 +7,8 @@ from statistics import NormalDist
 import numpy as np
 
 from mpm.arrays import Floats
+from mpm.constants import GRAVITY
 from mpm.physics.fluidisation import ERGUN
-
-from ..constants import GRAVITY
 
 SMALLEST = 0.2  # of the mean diameter: the smallest class; its collisions set the time step
 

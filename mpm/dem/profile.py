@@ -8,9 +8,9 @@ import numpy as np
 
 from mpm.arrays import Floats
 from mpm.case.profile import COLUMNS, Conditions
+from mpm.constants import GRAVITY
 from mpm.files import write_atomically
 
-from ..constants import GRAVITY
 from .waveform import Waveform, peak_displacement
 
 SINE = 0.02

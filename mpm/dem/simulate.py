@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.constants import GRAVITY
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import load_arrays, write_atomically
 
-from ..constants import GRAVITY
 from .base import FLAT, Base, Filling, fit_length, frit_monolayer, loose_filling, sawtooth_baffle
 from .box import Box
 from .case import DemCase

@@ -12,8 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from mpm.arrays import Floats
-
-from ..constants import GRAVITY
+from mpm.constants import GRAVITY
 
 
 class Waveform(Protocol):
@@ -158,19 +157,17 @@ def sine(*, gamma: float, frequency: float, angle: float, angle_from: str = "hor
     )
 
 
-def from_table(
-    t: Floats, acceleration: Floats, frequency: float | None = None, harmonics: int = 16
-) -> HarmonicWaveform:
+def from_table(t: Floats, acceleration: Floats, harmonics: int = 16) -> HarmonicWaveform:
     """One period of accelerations, t of shape (n,), acceleration (2, n) [m/s2], as a Fourier series.
 
-    Samples may be uneven; the last sample may repeat the first. A mean acceleration cannot belong to a periodic
-    motion and is dropped. `frequency` defaults to 1/(t[-1] - t[0]) of a table that closes.
+    Samples may be uneven; the last one lies a period after the first, whose place it takes. A mean acceleration cannot belong to a
+    periodic motion and is dropped.
     """
     from scipy.interpolate import CubicSpline  # which takes a second to load
 
     t = np.asarray(t, dtype=float)
     acceleration = np.asarray(acceleration, dtype=float)
-    period = 1.0 / frequency if frequency else float(t[-1] - t[0])
+    period = float(t[-1] - t[0])
     inside = t - t[0] < period * (1.0 - 1e-9)
     t, acceleration = t[inside], acceleration[:, inside]
     closed = np.append(t, t[0] + period)

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from mpm.case.model import Frozen
+from mpm.constants import GRAVITY
 from mpm.units import Angle, Dimension, Frequency, Positive, worked_out
 
-from ..constants import GRAVITY
 from .accelerometer import fit_record, read_record
 from .waveform import Harmonic, HarmonicWaveform, Sawtooth, Waveform, from_table, seed_table_2_2, sine
 
