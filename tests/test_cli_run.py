@@ -4,6 +4,7 @@ import json
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,7 +24,7 @@ def settings(**more: str) -> list[str]:
     return [part for key, value in chosen.items() for part in ("--set", f"{key}={json.dumps(value)}")]
 
 
-def numbers(directory: Path) -> dict:
+def numbers(directory: Path) -> dict[str, Any]:
     return json.loads((directory / "summary.json").read_text())
 
 

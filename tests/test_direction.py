@@ -64,7 +64,7 @@ def reversed_x(summary: Mapping[str, Any]) -> dict[str, Any]:
         pytest.param({**SHORT, TMA: 1e-3}, id="averaged"),
     ],
 )
-def test_mirror_image(kind: Any, changes: dict, tmp_path: Path) -> None:
+def test_mirror_image(kind: Any, changes: dict[str, Any], tmp_path: Path) -> None:
     """Fails when any number or field of a bed that moves to the left differs by more than 1e-10 from the mirror image of one that moves
     to the right (1e-8 on several ranks): entry, exit, box, fronts, film, dose ratio, utilisation, balances."""
     tolerance = 1e-10 if MPI.COMM_WORLD.size == 1 else 1e-8

@@ -111,9 +111,9 @@ def test_readers_of_the_documentation(tmp_path: Path, monkeypatch: pytest.Monkey
         directory.append_history({"time": step / 4, "balance.TMA": 1e-13 * step})
     monkeypatch.chdir(tmp_path)
     bed = (number + 80)[np.isin(np.arange(grid.cells) // grid.columns, range(21, 31))]
-    with_pyvista: dict = {}
-    with_mpm: dict = {}
-    with_numpy: dict = {}
+    with_pyvista: dict[str, Any] = {}
+    with_mpm: dict[str, Any] = {}
+    with_numpy: dict[str, Any] = {}
     for code, names in zip(
         blocks("docs/output.md", "python"), (with_pyvista, with_mpm, with_numpy), strict=True
     ):

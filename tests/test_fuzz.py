@@ -3,6 +3,7 @@
 import random
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -66,7 +67,7 @@ LAYER = {"name": "gas", "height": "1 mm", "cells": 2}
         ({"gas": {"carrier": "N2\x1b[2J", "molar_mass": "28 g/mol", "viscosity": "2e-5 Pa s"}}, "printable"),
     ],
 )  # fmt: skip
-def test_what_the_fuzz_found(changes: dict, line: str) -> None:
+def test_what_the_fuzz_found(changes: dict[str, Any], line: str) -> None:
     geometry = {"length": "100 mm", "cell_width": "1 mm", "layer": [LAYER], **changes.get("geometry", {})}
     with pytest.raises(InputError) as caught:
         load_case({**changes, "geometry": geometry})

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -223,7 +224,7 @@ def test_what_is_not_finite_is_kept_from_states_and_fields(run: RunDirectory, gr
     assert len(read_pvd(run.pvd)) == len(TIMES)
 
 
-DAMAGE = {
+DAMAGE: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda content: b"",
     "cut": lambda content: content[: len(content) // 2],
     "a line more": lambda content: content + b"x\n",

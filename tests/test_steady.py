@@ -40,7 +40,7 @@ DOSES = (1e-5, 1e-4, 2e-4, 1e-3, 1e-2)
 SPEEDS = (0.1, 0.5, 1.3, 5.0)  # cm/s
 
 
-def grid_case(kind: str, dose: float, speed: float, mesh: dict) -> Case:
+def grid_case(kind: str, dose: float, speed: float, mesh: dict[str, Any]) -> Case:
     """Single zone, or single cycle with the stoichiometric amount of water (molar 1 : 1.5)."""
     changes = {**STEADY, TMA: dose, "motion.bed_velocity": f"{speed} cm/s"}
     return cycle({**changes, WATER: 0.375 * dose}, mesh) if kind == "cycle" else zone(changes, mesh)
@@ -249,7 +249,7 @@ def test_a_coarser_mesh_first_changes_nothing(kind: str, monkeypatch: pytest.Mon
 
 @pytest.mark.parallel(alone=False)
 @pytest.mark.parametrize(("kind", "changes"), [("zone", {}), ("cycle", {}), ("zone", {**RETURNS, TMA: 1e-2})])
-def test_ranks_agree(kind: str, changes: dict) -> None:
+def test_ranks_agree(kind: str, changes: dict[str, Any]) -> None:
     """Fails when any physical number or field of the steady state depends on the number of ranks by more than 1e-8."""
     case = grid_case(kind, 2e-4, 1.3, TINY).with_(changes)
     _, alone = run(case, MPI.COMM_SELF)
@@ -347,7 +347,7 @@ def test_gas_without_solids() -> None:
 
 
 @pytest.mark.parametrize("changes", [{}, RETURNS], ids=["", "drawn back in"])
-def test_a_tracer_alone(changes: dict) -> None:
+def test_a_tracer_alone(changes: dict[str, Any]) -> None:
     """Fails when a gas that does not react has no steady state, or when that is not where an averaged run ends."""
     fed = {"geometry.inlet.tma.mass_fractions": {"CH4": 1e-3}}
     _, steady = run(zone({**changes, **fed, **STEADY}, TINY))
@@ -370,7 +370,7 @@ def test_a_tracer_alone(changes: dict) -> None:
     ],
     ids=["no precursor", "closed for good", "no flow of it", "no flow at all"],
 )
-def test_nothing_is_dosed(changes: dict) -> None:
+def test_nothing_is_dosed(changes: dict[str, Any]) -> None:
     """Fails when a steady state in which no precursor comes in is not that: gas without it, solids as they were."""
     _, result = run(zone({**STEADY, **changes}, TINY))
     assert result.field("C_TMA").max() == 0.0

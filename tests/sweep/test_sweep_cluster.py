@@ -30,7 +30,7 @@ def dask(bench: Bench) -> Iterator[Any]:
     """`dask(2)`: address of a scheduler on loopback and the processes of that many workers, one point at a time each."""
     processes = []
 
-    def start(*command: str) -> subprocess.Popen:
+    def start(*command: str) -> subprocess.Popen[bytes]:
         process = subprocess.Popen(
             [sys.executable, "-m", *command],
             env=bench.variables,
@@ -41,7 +41,7 @@ def dask(bench: Bench) -> Iterator[Any]:
         processes.append(process)
         return process
 
-    def cluster(workers: int) -> tuple[str, list[subprocess.Popen]]:
+    def cluster(workers: int) -> tuple[str, list[subprocess.Popen[bytes]]]:
         import distributed
 
         file = bench.path / "scheduler.json"

@@ -4,6 +4,7 @@ import math
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -144,8 +145,9 @@ def test_samples_fill_their_ranges_evenly(tmp_path: Path, method: str) -> None:
     )
     sweep = read_sweep(sweep_file(tmp_path, body, f'mode = "sample"\nsamples = 16\nmethod = "{method}"'))
     points = plan(sweep)
-    for place, scaled in enumerate((lambda y: math.log10(y) / 2 + 2, lambda v: (v - 0.005) / 0.025)):
-        strata = sorted(int(16 * scaled(point.numbers[place])) for point in points)
+    scales: list[Callable[[float], float]] = [lambda y: math.log10(y) / 2 + 2, lambda v: (v - 0.005) / 0.025]
+    for place, scaled in enumerate(scales):
+        strata = sorted(int(16 * scaled(float(point.numbers[place]))) for point in points)
         assert strata == list(range(16))
     assert [point.name for point in plan(sweep)] == [point.name for point in points]
 
