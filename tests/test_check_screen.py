@@ -58,6 +58,7 @@ def test_defaults_are_marked() -> None:
         "end 20 s (default)",
         "porosity 0.4 permeability 5 um^2 tortuosity",
         "tortuosity factor 1.58114 (worked out)",
+        "Marks not typed in the case but taken from (default) the program, ",
     ):
         assert part in text, part
     own = load_case(OWN, {"geometry.periodic": False, "motion.bed_velocity": "1.3 cm/s"})
