@@ -18,9 +18,11 @@ from mpm.flow.fields import FlowField
 from mpm.flow.problem import FlowProblem
 from mpm.flow.steady import steady_flow
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
+from mpm.numerics.fem import PETSc
 from mpm.parallel import largest
 
 Floats = NDArray[np.float64]
+_State = tuple[Floats, Floats]  # fluxes and pressure
 PERIODIC = 1e-6  # change of the velocities from one cycle to the next, relative to the fastest
 CYCLE_LIMIT = 200
 MEAN_TOLERANCE = 1e-3  # of the correction of a mean, which leaves a third of what the cycle lacks in any case
@@ -60,28 +62,10 @@ def periodic_flow(
         acceleration=float(np.mean([m.acceleration for m in motions])),
         frame_velocity_y=float(np.mean([m.frame_velocity_y for m in motions])),
     )
-    # fluxes and pressures of the last cycle; the next one takes their places, because two of them would be much to hold beside the factors
-    states: list[tuple[Floats, Floats]] = []
-    velocities = problem.space.velocities(problem.values)
+    # the next cycle takes the place of the last one's states, because two of them would be much to hold beside the factors
+    states: list[_State] = []
     for cycle in range(CYCLE_LIMIT):
-        convective_mean = problem.convective_force().duplicate()
-        state_mean = np.zeros_like(problem.values)
-        change = speed = 0.0
-        for phase, motion in enumerate(motions):
-            force = problem.convective_force()
-            convective_mean.axpy(1.0 / phases, force)
-            problem.step(motion, force)
-            before, velocities = velocities, problem.space.velocities(problem.values)
-            check_bounded(problem.case, problem.strip, before, velocities, problem.dt)
-            state_mean += problem.values / phases
-            state = problem.values.copy(), problem.pressure()
-            if cycle == 0:
-                states.append(state)
-                continue
-            speed = max(speed, problem.space.fastest(state[0]))
-            change = max(change, problem.space.fastest(state[0] - states[phase][0]))
-            states[phase] = state
-        change = _relative(problem, change, speed) if cycle else np.inf
+        change, state_mean, convective_mean = _march(problem, motions, states)
         if watch is not None:
             watch(cycle, change)
         if change < PERIODIC:
@@ -99,6 +83,36 @@ def periodic_flow(
     raise ConvergenceError(
         f"periodic flow: velocities still change by {change:.3g} per cycle after {CYCLE_LIMIT} cycles"
     )
+
+
+def _march(
+    problem: FlowProblem, motions: list[StepMotion], states: list[_State]
+) -> tuple[float, Floats, PETSc.Vec]:
+    """March through one cycle and put its fluxes and pressures into `states`, those of the cycle before, or none.
+
+    Returns the largest change of a velocity since the cycle before, relative to the fastest (infinite without one), and the cycle's means
+    of the fluxes and of the convective force. Raises ConvergenceError when the flow leaves all bounds.
+    """
+    phases, first = len(motions), not states
+    convective_mean = problem.convective_force().duplicate()
+    state_mean = np.zeros_like(problem.values)
+    change = speed = 0.0
+    velocities = problem.space.velocities(problem.values)
+    for phase, motion in enumerate(motions):
+        force = problem.convective_force()
+        convective_mean.axpy(1.0 / phases, force)
+        problem.step(motion, force)
+        before, velocities = velocities, problem.space.velocities(problem.values)
+        check_bounded(problem.case, problem.strip, before, velocities, problem.dt)
+        state_mean += problem.values / phases
+        state = problem.values.copy(), problem.pressure()
+        speed = max(speed, problem.space.fastest(state[0]))
+        if first:
+            states.append(state)
+        else:
+            change = max(change, problem.space.fastest(state[0] - states[phase][0]))
+            states[phase] = state
+    return np.inf if first else _relative(problem, change, speed), state_mean, convective_mean
 
 
 def _relative(problem: FlowProblem, change: float, speed: float) -> float:
