@@ -110,6 +110,7 @@ def drawn_values(figure: Figure) -> np.ma.MaskedArray:
     return np.ma.ravel(next(array for array in arrays if array is not None))
 
 
+@pytest.mark.usefixtures("result")  # which runs into the folder, in whatever process
 @pytest.mark.parametrize(
     ("asked", "meant"),
     [("theta", "theta_OAl(CH3)2"), (None, "theta_OAl(CH3)2"), ("x", "x_TMA"), ("C", "C_TMA"), ("TMA", "x_TMA"), ("OH", "theta_OH"),
