@@ -75,6 +75,13 @@ def test_coverage_front_is_signed(grid: Grid, place: float) -> None:
     assert found == pytest.approx(0.1048 - place, abs=grid.dx)
 
 
+@pytest.mark.parametrize("place", [0.09, 0.12])
+def test_coverage_front_is_linear_between_columns(grid: Grid, place: float) -> None:
+    """Fails when the coverage of a ramp passes another value than 1/2 there, upstream or downstream of the inlet."""
+    ramp = np.clip(0.5 + (centres(grid) - place) / 0.04, 0.0, 1.0)
+    assert coverage_front(grid, ramp, center=0.1048, incoming=0.0) == pytest.approx(0.1048 - place, abs=1e-12)
+
+
 def test_solids_do_not_come_round_the_seam(grid: Grid) -> None:
     """A bed covered throughout whose solids come in bare has its front at the left end; one that comes in covered has none."""
     covered = np.ones(grid.columns)

@@ -11,6 +11,7 @@ from mpm.reactor.result import Result
 from mpm.report.balances import TERMS
 from mpm.report.quantities import HEADINGS, QUANTITIES, SECTIONS, entry, files_of, quantity
 from mpm.report.quantity import RATIO
+from mpm.report.rounding import natural_scale
 from mpm.report.trees import flatten, nest
 from tests.cases import COARSE
 
@@ -80,6 +81,17 @@ def test_a_row_becomes_a_tree_and_a_row_again() -> None:
     row = {"time": 1.0, "outlets.a.x.TMA": 0.5, "outlets.a.backflow": 0.0, "outlets.b.x.TMA": 0.25}
     assert nest(row)["outlets"] == {"a": {"x": {"TMA": 0.5}, "backflow": 0.0}, "b": {"x": {"TMA": 0.25}}}
     assert flatten(nest(row)) == row
+
+
+def test_amounts_are_measured_by_the_largest_feed() -> None:
+    """Fails when rounding of an amount is judged by what a reaction makes, or by a share."""
+    numbers = {
+        "species.TMA.fed": 2.0,
+        "species.H2O.fed": 1.0,
+        "species.CH4.produced": 5.0,
+        "species.TMA.balance_error": 7.0,
+    }
+    assert natural_scale("species.CH4.left", numbers) == 2.0
 
 
 def test_units_for_people_are_the_same_dimension() -> None:

@@ -19,6 +19,7 @@ from mpm.physics.exponentials import phi1, phi2
 from mpm.reactor.flow import Flow
 from mpm.reactor.reactor import Reactor
 from mpm.reactor.steady.coarsening import coarser
+from mpm.report.fronts import coverage_front
 
 from .cases import (
     CASES,
@@ -210,6 +211,16 @@ def test_periodic_solids_between_two_precursors(
     sites = np.array([r.nu_site["OH"] for r in reactor.system.transport.reactions.surface.reactions])
     assert abs(events @ sites) < 1e-9 * np.abs(events).max()
     assert 0.5 < result.coverage("bed", "OH").mean() < 0.999
+
+
+def test_front_that_is_reported_is_that_of_the_field() -> None:
+    """Fails when the front of the coverage in the bed is not reported, or is that of another layer, site or place."""
+    reactor, result = run(zone({**STEADY, TMA: 1e-4}, TINY))
+    profile = result.coverage("bed", "OAl(CH3)2").mean(axis=0)
+    (tma,) = (inlet for inlet in reactor.case.geometry.inlets if inlet.name == "tma")
+    expected = coverage_front(reactor.grid, profile, center=tma.center, incoming=0.0)
+    assert expected is not None
+    assert result.summary["front"]["tma"]["bed"]["coverage"] == pytest.approx(expected, abs=1e-12)
 
 
 def test_nothing_fed_is_nothing_lost() -> None:
