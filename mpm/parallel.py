@@ -9,9 +9,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import MpmError
-
-Floats = NDArray[np.float64]
 
 
 def is_root(comm: MPI.Comm) -> bool:

@@ -19,8 +19,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP
 from mpm.numerics.fem import PETSc, dolfinx
 
@@ -29,8 +29,6 @@ from mpi4py import MPI  # isort: skip  (after fem)
 if TYPE_CHECKING:
     from mpm.flow.space import FlowSpace
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 ALONG = {BOTTOM: (LEFT, RIGHT), TOP: (LEFT, RIGHT), LEFT: (BOTTOM, TOP), RIGHT: (BOTTOM, TOP)}
 """Sides of a cell that the tangential velocity along each of its sides is interpolated between."""
 MASS = np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]])

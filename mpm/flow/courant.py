@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import Vibration
@@ -16,7 +16,6 @@ from mpm.parallel import largest
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Floats = NDArray[np.float64]
 BOUND = 10.0  # times the speed that ports and motion give: no flow of a strip gets there, a diverging one passes it within some steps
 
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.flow.courant import check_bounded
 from mpm.flow.fields import FlowField
@@ -21,7 +21,6 @@ from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
 from mpm.numerics.fem import PETSc
 from mpm.parallel import largest
 
-Floats = NDArray[np.float64]
 _State = tuple[Floats, Floats]  # fluxes and pressure
 PERIODIC = 1e-6  # change of the velocities from one cycle to the next, relative to the fastest
 CYCLE_LIMIT = 200

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 from mpm.parallel import total
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.ports import Inlet
     from mpm.mesh.grid import Grid
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,16 +8,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.flow.fields import FlowField, boundary_flows, face_flow
 from mpm.mesh.strip import BOTTOM, TOP, Strip
 from mpm.parallel import total
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-
-Floats = NDArray[np.float64]
 
 
 def flow_numbers(case: Case, strip: Strip, mean: FlowField) -> dict[str, Any]:

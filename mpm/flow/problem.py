@@ -25,9 +25,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import ufl
-from numpy.typing import NDArray
 from ufl import Form
 
+from mpm.arrays import Floats
 from mpm.flow.convection import Convection
 from mpm.flow.fields import FlowField
 from mpm.flow.space import CLOSED, FlowSpace
@@ -41,7 +41,6 @@ from mpm.parallel import largest
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Floats = NDArray[np.float64]
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
 Ports = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
 CLOSED_PORTS: Ports = (0.0, 0.0)

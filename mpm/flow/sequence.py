@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
 from mpm.flow.cycle import mean_motion, periodic_flow
 from mpm.flow.fields import FlowField, mean_field
@@ -21,7 +21,6 @@ from mpm.motion.schedule import RESTING, Schedule, Step
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Floats = NDArray[np.float64]
 Watch = Callable[[int, float], None]  # of a cycle's number and what has changed since the one before
 
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import basix.ufl
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.errors import InputError
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 from mpm.numerics.fem import PETSc, dolfinx
@@ -22,8 +22,6 @@ from mpm.numerics.fem import PETSc, dolfinx
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 CLOSED, OPEN = 1, 2  # facet markers: walls and inlets, outlets
 
 

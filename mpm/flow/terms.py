@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
-from numpy.typing import NDArray
 from ufl import Form, conditional, dot, dS, dx, grad, inner, jump, lt
 
+from mpm.arrays import Floats
 from mpm.mesh.strip import Strip
 from mpm.numerics.fem import dolfinx
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.materials import Material
 
-Floats = NDArray[np.float64]
 Expr = Any  # of UFL, which has no types
 
 

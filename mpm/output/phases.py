@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.mesh.grid import Grid
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,17 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mpm.arrays import Floats
 from mpm.case.case import Case, load_case
 from mpm.case.kinds import RUN, kind_of_directory, what_it_is
 from mpm.errors import InputError, MpmError
 from mpm.mesh.grid import Grid
 from mpm.output.directory import RunDirectory
 from mpm.output.vtu import Snapshot, grid_points, grid_quads
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

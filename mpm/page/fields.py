@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import InputError
 from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
 
-Floats = NDArray[np.float64]
 Maker = Callable[[Run, Snapshot], Floats]
 LEVELS = 4095
 """Levels of a colour range; 0 stands below them for what is less than the smallest value of a logarithmic range, or is not there."""

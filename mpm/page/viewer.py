@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mpm.arrays import Floats
 from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
 from mpm.page.fields import (
@@ -14,7 +15,6 @@ from mpm.page.fields import (
     MOST_JOINED,
     Encoded,
     Film,
-    Floats,
     Look,
     Maker,
     encode,

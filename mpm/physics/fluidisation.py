@@ -8,11 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.constants import GAS_CONSTANT, GRAVITY
-
-Floats = NDArray[np.float64]
 
 ERGUN = (150.0, 1.75)
 """Ergun's factors A of the viscous and B of the inertial drag (1952)."""

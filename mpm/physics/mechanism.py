@@ -17,11 +17,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mpm.arrays import Floats
 from mpm.constants import GAS_CONSTANT
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.labels import literal
 from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
@@ -21,7 +22,6 @@ from mpm.report.balances import LIMIT
 from mpm.report.coating import exit_column
 from mpm.report.fieldnames import NOTHING
 
-Floats = NDArray[np.float64]
 TITRATION = {
     "box_mean": ("-", "in the bed before the inlet, mean", "in the zone before the inlet, mean"),
     "exit_mean": ("--", "where solids leave the zone, mean", "in the last column of the zone, mean"),

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 from matplotlib.ticker import ScalarFormatter
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.labels import literal
 from mpm.mesh.grid import Grid
 from mpm.output.results import Run
@@ -24,7 +24,6 @@ from mpm.pictures.outline import LINE, MM, WIDTH, draw_layers, draw_ports, draw_
 from mpm.pictures.streamlines import stream_function, stream_levels
 from mpm.report.fieldnames import FieldName, Limits, colour_limits, field_name, field_values
 
-Floats = NDArray[np.float64]
 PLAIN = "#d9e3ea"
 """Colour of a field that is the same everywhere."""
 OUTLINE: list[AbstractPathEffect] = [withStroke(linewidth=1.7, foreground="0.25", alpha=0.6)]

@@ -10,9 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.mesh.grid import Grid
-
-Floats = NDArray[np.float64]
 
 
 def stream_function(grid: Grid, velocity: NDArray[np.generic]) -> Floats:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mpm.arrays import Floats
 from mpm.errors import InputError
 from mpm.flow.sequence import CyclicFlow, FlowSequence, MarchedFlow, Watch
 from mpm.transport.dispersion import vibrational_dispersion
@@ -17,8 +15,6 @@ if TYPE_CHECKING:
     from mpm.mesh.strip import Strip
     from mpm.motion.kinematics import BedMotion
     from mpm.motion.schedule import Schedule
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mpm.arrays import Floats
 from mpm.mesh.grid import Grid
 from mpm.output.history import Row, columns_of
 from mpm.reactor import records
@@ -29,8 +27,6 @@ from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-
-Floats = NDArray[np.float64]
 
 
 class Reactor:

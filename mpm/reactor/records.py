@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import InputError
 from mpm.parallel import largest, total
 from mpm.report.records import State, Totals
 
 if TYPE_CHECKING:
     from mpm.reactor.system import System
-
-Floats = NDArray[np.float64]
 
 
 def totals(system: System) -> Totals:

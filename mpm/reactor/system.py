@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.flow.sequence import CyclicFlow, MarchedFlow, Watch
 from mpm.mesh.strip import Strip
@@ -23,8 +21,6 @@ from mpi4py import MPI  # isort: skip  (after fem)
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.flow.fields import FlowField
-
-Floats = NDArray[np.float64]
 
 
 class System:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.mesh.grid import ON_EDGE, Grid
 from mpm.report.dosing import zone_of
 from mpm.report.records import State, Totals, running_surface
@@ -18,8 +19,6 @@ from mpm.report.records import State, Totals, running_surface
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.zones import Zone
-
-Floats = NDArray[np.float64]
 
 
 def titrated(case: Case, species: str, theta: Floats) -> Floats:

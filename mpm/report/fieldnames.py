@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm import units
+from mpm.arrays import Floats
 from mpm.errors import InputError
 from mpm.report.quantity import RATIO
 
-Floats = NDArray[np.float64]
 DECADES = 4
 """Range of a logarithmic scale below its maximum."""
 ROUNDING = 1e-6

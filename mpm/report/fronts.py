@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.mesh.grid import ON_EDGE, Grid
 from mpm.report.balances import FLOOR
 from mpm.report.coating import titrated, within
@@ -18,8 +19,6 @@ from mpm.report.records import State
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.ports import Inlet
-
-Floats = NDArray[np.float64]
 
 
 def crossing(distance: Floats, values: Floats, level: float) -> float | None:

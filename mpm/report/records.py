@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
+
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.mesh.grid import Grid
     from mpm.physics.mechanism import GasReaction, SurfaceReaction
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
