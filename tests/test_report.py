@@ -34,7 +34,7 @@ from mpm.page.run_page import run_page
 from mpm.page.strip import LETTER, drawing
 from mpm.page.sweep_page import sweep_page
 from mpm.report.trees import flatten
-from mpm.report.verdict import verdict
+from mpm.report.verdict import percent, verdict
 from mpm.sweep.layout import Layout
 from tests.cases import COARSE, SHORT, TINY
 
@@ -545,6 +545,18 @@ def test_rounding_is_no_amount_of_a_species() -> None:
     assert [row.shown for row in accounts(summary)[1].rows] == ["0"] * 5
     assert set(accounts(summary)[1].shares) == {""}
     assert [row.shown for _, rows in groups(summary) for row in rows] == ["0", "0"]
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [
+        (1e-17, "0 %"), (1e-6, "less than 0.001 %"), (0.12345, "12.3 %"), (0.99996, "99.996 %"), (1.0 - 1e-7, "almost 100 %"),
+        (1.0, "100 %"), (1.2, "120 %"),
+    ],
+)  # fmt: skip
+def test_what_is_nearly_all_or_nothing_is_not_rounded(share: float, words: str) -> None:
+    """Fails when a trace is called none, or a coating that lacks a little complete."""
+    assert percent(share) == words
 
 
 def test_the_verdict_counts_inlets_together(cycle: Path) -> None:
