@@ -72,6 +72,9 @@ class FlowProblem:
         closed = ufl.Measure("ds", domain=self.strip.mesh, subdomain_data=self.space.facets)(CLOSED)
         self.viscous = _matrix(viscosity(u, v, m, closed) + drag(u, v, m))
         self.mass = _matrix(inertia(u, v, m))
+        step = self.viscous.copy()
+        step.axpy(1.0 / self.dt, self.mass, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        self._matrices = {"steady": self.viscous, "step": step}
         solids = self.space.along_x(m.moving_solid)  # their volume flux per unit velocity of the bed
         self.entrainment = _vector(bed_entrainment(solids, v, m, closed))
         self.acceleration = _vector(frame_acceleration(v, m))
@@ -88,11 +91,7 @@ class FlowProblem:
     def _solver(self, kind: str) -> DirectSolver:
         """The factor of Z^T A Z, for a "step" of Z^T (A + M/dt) Z."""
         if kind not in self._solvers:
-            matrix = self.viscous
-            if kind == "step":
-                matrix = self.viscous.copy()
-                matrix.axpy(1.0 / self.dt, self.mass, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            reduced = matrix.ptap(self.space.curl)
+            reduced = self._matrices[kind].ptap(self.space.curl)
             self._solvers[kind] = DirectSolver(reduced, f"flow ({kind})", definite=True)
         return self._solvers[kind]
 
@@ -153,7 +152,7 @@ class FlowProblem:
         residual.array[:] += force.array[: self.space.own]
 
     def _balance(self, kind: str, passes: int = 1) -> None:
-        """Change the state so that `_residual` has no curl; it is kept up to date."""
+        """Change the state so that `unbalanced` has no curl; it is kept up to date."""
         if self._psi.size == 0:
             return  # walls all around a cell
         solver = self._solver(kind)
@@ -161,10 +160,7 @@ class FlowProblem:
             self.space.curl.multTranspose(self.unbalanced, self._rhs)
             solver.solve(self._rhs, self._psi)
             self._adopt()
-            self.viscous.multAdd(self._work, self.unbalanced, self.unbalanced)
-            if kind == "step":
-                self._work.scale(1.0 / self.dt)
-                self.mass.multAdd(self._work, self.unbalanced, self.unbalanced)
+            self._matrices[kind].multAdd(self._work, self.unbalanced, self.unbalanced)
 
     def _adopt(self) -> None:
         """Subtract the curl of `_psi` from the state; leaves the change in `_work`."""
