@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from mpm.arrays import Floats
 from mpm.errors import MpmError
+from mpm.launcher import share_cores
+
+share_cores(os.environ)
+
+from mpi4py import MPI  # noqa: E402  isort: skip  (reads the environment)
 
 
 def is_root(comm: MPI.Comm) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mpm.cli import main
-from mpm.launcher import launched_rank
+from mpm.launcher import launched_rank, share_cores
 
 TASK_FARMS = (
     {"SLURM_PROCID": "1", "SLURM_NTASKS": "8", "SLURM_STEP_NUM_TASKS": "8"},
@@ -68,6 +68,27 @@ def test_ranks_of_an_mpi_launcher_are_counted() -> None:
         launched_rank({"OMPI_COMM_WORLD_RANK": "2", "OMPI_COMM_WORLD_SIZE": "4", "PMIX_NAMESPACE": "j"}) == 2
     )
     assert launched_rank({"PMIX_RANK": "5", "SLURM_STEP_NUM_TASKS": "8", "PMIX_NAMESPACE": "j"}) == 5
+
+
+JOB = {"PMIX_RANK": "0", "SLURM_STEP_NUM_TASKS": "2", "PMIX_NAMESPACE": "j"}
+SLEEP = "MPIR_CVAR_ENABLE_HEAVY_YIELD"
+
+
+def test_ranks_sleep_where_cores_are_short(tmp_path: Path) -> None:
+    """Fails when ranks poll for each other on a crowded machine, sleep on a free one, or each start a thread per core."""
+    crowded, free, strange = tmp_path / "crowded", tmp_path / "free", tmp_path / "strange"
+    crowded.write_text("400000000 890000000 170\n")
+    free.write_text("400000000 8000000 31\n")
+    strange.write_text("none\n")
+    for statistics, expected in ((crowded, "1"), (free, None), (strange, None), (tmp_path / "none", None)):
+        environment = dict(JOB)
+        share_cores(environment, statistics)
+        assert environment.get(SLEEP) == expected and environment["OMP_NUM_THREADS"] == "1"
+    chosen = JOB | {SLEEP: "0", "OMP_NUM_THREADS": "4"}
+    share_cores(environment := dict(chosen), crowded)
+    assert environment == chosen
+    share_cores(alone := {"PMI_RANK": "0"}, crowded)
+    assert alone == {"PMI_RANK": "0"}
 
 
 def test_versions_are_printed_once_by_two_ranks() -> None:

@@ -16,6 +16,9 @@ from typing import Any
 
 from mpm.errors import FULL, InputError, MpmError
 from mpm.files import lock
+from mpm.launcher import share_cores
+
+share_cores(os.environ)
 
 # PETSc would take SIGTERM and SIGPIPE away from Python
 os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler".strip()
