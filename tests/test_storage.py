@@ -275,6 +275,14 @@ def test_a_form_left_by_a_killed_run_is_compiled_again(tmp_path: Path) -> None:
     compiled()
 
 
+def test_a_form_that_is_ready_does_not_wait_for_one_that_is_compiled(tmp_path: Path) -> None:
+    """Fails (by its time limit) when a run whose forms are there waits for another process that holds the compiler."""
+    command = [sys.executable, "-c", COMPILE, str(tmp_path / "cache")]
+    subprocess.run(command, check=True, capture_output=True)
+    with lock(tmp_path / "cache" / "lock", 0.0):
+        subprocess.run(command, check=True, capture_output=True, timeout=60)
+
+
 def test_equations_that_cannot_be_compiled_are_said_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable
-from contextlib import nullcontext, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -70,17 +70,30 @@ def check_cache() -> None:
         )
 
 
-def one_at_a_time(compile_forms: Callable[..., Any]) -> Callable[..., Any]:
-    """ffcx's compiler, one process at a time in mpm's cache.
+class NotReady(Exception):
+    """A form has not been compiled yet."""
+
+
+def one_at_a_time(compile_forms: Callable[..., Any], look_up: Callable[..., Any]) -> Callable[..., Any]:
+    """ffcx's compiler, one process at a time in mpm's cache; forms that are ready are loaded without waiting for it. `look_up` is what ffcx
+    itself looks a form up with.
 
     ffcx marks a form as taken by its .c file and as ready by its .c.cached; whoever finds the first alone waits for the second. A process
     that was killed in between would make all later ones wait in vain. Under the lock nobody is in between: such files are left over, and
     removed.
     """
 
+    def only_if_ready(name: str, objects: Any, cache_dir: Path, timeout: int) -> Any:
+        source = Path(cache_dir) / f"{name}.c"
+        if not (source.exists() and source.with_suffix(".c.cached").exists()):
+            raise NotReady
+        return look_up(name, objects, cache_dir, timeout)
+
     @functools.wraps(compile_forms)
     def compile_here(forms: Any, options: Any = None, cache_dir: Any = None, **rest: Any) -> Any:
         cache = cache_directory()
+        with suppress(NotReady), replaced(ffcx.codegeneration.jit, "get_cached_module", only_if_ready):
+            return compile_forms(forms, options=options, cache_dir=cache, **rest)
         try:
             alone = lock(cache / "lock", COMPILING) if os.access(cache, os.W_OK) else nullcontext()
         except BlockingIOError:
@@ -92,6 +105,17 @@ def one_at_a_time(compile_forms: Callable[..., Any]) -> Callable[..., Any]:
             return compile_forms(forms, options=options, cache_dir=cache, **rest)
 
     return compile_here
+
+
+@contextmanager
+def replaced(owner: Any, name: str, value: Any) -> Iterator[None]:
+    """`owner.name` is `value` for a while."""
+    before = getattr(owner, name)
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        setattr(owner, name, before)
 
 
 def reported(jit: Callable[..., Any]) -> Callable[..., Any]:
@@ -111,4 +135,6 @@ def reported(jit: Callable[..., Any]) -> Callable[..., Any]:
 
 
 dolfinx.jit.ffcx_jit = reported(dolfinx.jit.ffcx_jit)
-ffcx.codegeneration.jit.compile_forms = one_at_a_time(ffcx.codegeneration.jit.compile_forms)
+ffcx.codegeneration.jit.compile_forms = one_at_a_time(
+    ffcx.codegeneration.jit.compile_forms, ffcx.codegeneration.jit.get_cached_module
+)
