@@ -3,8 +3,9 @@
 The flux through every facet is one number, that of Raviart-Thomas elements of lowest order on quadrilaterals. Fields with div u = 0 and the
 prescribed flow through walls and inlets are u = u_p + Z psi: `u_p` is any one of them, psi a stream function on the vertices of the grid
 [m2/s], Z its discrete curl, u_x = dpsi/dy and u_y = -dpsi/dx, whose entries are +-1 (Chorin's null-space method; as exact as the grid is,
-whatever psi). Along a wall psi is one number, because nothing flows through; vertices within an outlet have their own. The pressure is not
-an unknown: it follows from the forces that a solution leaves on each facet.
+whatever psi). Along a wall psi is one number, because nothing flows through; vertices within an outlet have their own. What flows up
+through a whole periodic strip, from outlets of one side to those of the other, has no psi that is the same after a turn: its amount is
+an unknown of its own. The pressure is not an unknown: it follows from the forces that a solution leaves on each facet.
 """
 
 from __future__ import annotations
@@ -167,7 +168,8 @@ ROUNDING = 1e-12  # of what flows through a wall
 class StreamFunction:
     """Numbers of the unknowns psi on the vertices of the grid, the same on every rank.
 
-    `number` (levels, vertex columns) is the global number of each vertex, -1 where psi = 0; `count` and `first` are those of this rank.
+    `number` (levels, vertex columns) is the global number of each vertex, -1 where psi = 0; `upwards` that of what flows up through the
+    whole strip (see above), None where the vertices say it all. `count` unknowns are this rank's.
     """
 
     def __init__(self, case: Case, strip: Strip):
@@ -187,7 +189,11 @@ class StreamFunction:
         numbers[np.flatnonzero(free)[order]] = np.arange(len(order))
         self.number = numbers[inverse].reshape(grid.rows + 1, columns)
         counts = np.bincount(owner[first_vertex[free]], minlength=comm.size)
-        self.count, self.first = int(counts[comm.rank]), int(counts[: comm.rank].sum())
+        self.upwards: int | None = None
+        if grid.periodic and len({outlet.side for outlet in case.geometry.outlets}) == 2:
+            self.upwards = len(order)
+            counts[-1] += 1
+        self.count = int(counts[comm.rank])
 
     def _groups(self, case: Case, strip: Strip) -> Ints:
         """Which vertices share one psi: those of a closed stretch of wall; the first stretch is group 0. (vertices,), level by level."""
@@ -246,6 +252,12 @@ def _curl(space: FlowSpace, psi: StreamFunction) -> PETSc.Mat:
         rows.append(first + own[chosen])
         columns.append(numbers[chosen])
         values.append(part * sign[own][chosen])
+    if psi.upwards is not None:
+        path = _way_up(space)[: space.own]
+        passed = np.flatnonzero(path)
+        rows.append(first + passed)
+        columns.append(np.full(len(passed), psi.upwards))
+        values.append(path[passed])
     curl = PETSc.Mat().create(strip.comm)
     curl.setSizes(((space.own, None), (psi.count, None)))
     curl.setType("aij")
@@ -254,3 +266,19 @@ def _curl(space: FlowSpace, psi: StreamFunction) -> PETSc.Mat:
     )
     curl.setValuesCOO(np.concatenate(values))
     return curl
+
+
+def _way_up(space: FlowSpace) -> Floats:
+    """Fluxes (local fluxes,) of one unit from an outlet at the bottom along the lowest row, then up to an outlet at the top."""
+    strip, outlets = space.strip, space.case.geometry.outlets
+    start, end = (
+        min(int(np.flatnonzero(strip.grid.opening(o))[0]) for o in outlets if o.side == side)
+        for side in ("bottom", "top")
+    )
+    row, column = strip.row, strip.column
+    field = np.zeros(len(space.weights))
+    field[space.dofs[(row == 0) & (column == start), BOTTOM]] = 1.0
+    between = (row == 0) & (min(start, end) <= column) & (column < max(start, end))
+    field[space.dofs[between, RIGHT]] = np.sign(end - start)
+    field[space.dofs[column == end, TOP]] = 1.0
+    return np.asarray(field * np.sign(space.weights))
