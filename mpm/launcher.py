@@ -23,7 +23,7 @@ _LAUNCHERS = (
 SCHEDULER = Path("/proc/self/schedstat")
 """Nanoseconds on a core, nanoseconds waiting for one, time slices of this process (Linux: Documentation/scheduler/sched-stats.rst)."""
 CROWDED = 1.5
-"""Waiting for a core over having one, from which ranks do not poll: sleeping was measured to be better at 2 to 4, and not at 1."""
+"""Waiting for a core over having one, from which ranks do not poll: sleeping was measured better at 2 to 4; below, one sample says not."""
 
 
 def rank() -> int:
