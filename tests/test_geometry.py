@@ -34,16 +34,17 @@ def test_y_is_zero_at_the_top_of_the_moving_layer(grid: Grid) -> None:
     assert still.y[0] == 0.0
 
 
-def test_layers_zones_and_volumes(grid: Grid) -> None:
-    """Fails when rows or columns are attributed to the wrong layer or zone, or cell volumes do not add up to the strip."""
+def test_layers_zones_and_lengths(grid: Grid) -> None:
+    """Fails when rows or columns are attributed to the wrong layer or zone, or cells do not add up to the strip."""
     assert [grid.layer_rows(n) for n in grid.layer_names] == [
         slice(0, 4),
         slice(4, 7),
         slice(7, 11),
         slice(11, 19),
     ]
-    assert grid.volumes.sum() == pytest.approx(139.7e-3 * 22.29e-3, rel=1e-12)
-    assert grid.cells == grid.rows * grid.columns == len(grid.volumes)
+    assert grid.dx * grid.columns == pytest.approx(139.7e-3, rel=1e-12)
+    assert grid.dy.sum() == pytest.approx(22.29e-3, rel=1e-12)
+    assert grid.cells == len(grid.dy) * grid.columns
     assert set(grid.zone_of_column) == {1}
     two = Grid.from_case(zone({"geometry.zone.zone1.start": "70 mm", "geometry.zone.zone1.end": "120 mm"}))
     assert np.array_equal(two.zone_of_column == 1, two.columns_between(70e-3, 120e-3))

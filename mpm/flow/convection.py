@@ -23,6 +23,7 @@ import numpy as np
 from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP
 from mpm.numerics.fem import PETSc, dolfinx
+from mpm.numerics.sparse import sparse_matrix
 
 from mpi4py import MPI  # isort: skip  (after fem)
 
@@ -233,9 +234,6 @@ class _Entries:
 
 def _matrix(rows: int, columns: int, row: Ints, column: Ints, values: Floats) -> PETSc.Mat:
     """A sparse matrix of this rank alone."""
-    matrix = PETSc.Mat().create(MPI.COMM_SELF)
-    matrix.setSizes((rows, columns))
-    matrix.setType("seqaij")
-    matrix.setPreallocationCOO(row.astype(PETSc.IntType), column.astype(PETSc.IntType))
+    matrix = sparse_matrix(MPI.COMM_SELF, rows, columns, (row, column))
     matrix.setValuesCOO(values)
     return matrix

@@ -71,13 +71,10 @@ def periodic_flow(
             return [FlowField(problem.space.velocities(fluxes), pressure) for fluxes, pressure in states]
         last = problem.values.copy()
         problem.values[:] = state_mean
-        with suppress(
-            ConvergenceError
-        ):  # of a flow that is about to diverge, which the next cycle tells better
+        with suppress(ConvergenceError):  # a flow that is about to diverge: the next cycle says it better
             problem.newton_update(mean, convective_mean, tolerance=MEAN_TOLERANCE)
-        problem.values[:] += (
-            last - state_mean
-        )  # the mean corrected; the last phase keeps its distance from it
+        # the mean is corrected; the last phase keeps its distance from it
+        problem.values[:] += last - state_mean
         convective_mean.destroy()
     raise ConvergenceError(
         f"periodic flow: velocities still change by {change:.3g} per cycle after {CYCLE_LIMIT} cycles"

@@ -69,13 +69,6 @@ def face_flow(strip: Strip, velocities: Floats) -> FaceFlow:
     return FaceFlow(velocities[sides, faces.behind], velocities[BOTTOM, bottom], velocities[TOP, top])
 
 
-def net_outflow(strip: Strip, velocities: Floats) -> Floats:
-    """div u integrated over each own cell [m2/s]."""
-    own = strip.owned
-    u, height, width = velocities[:, :own], strip.height[:own], strip.grid.dx
-    return np.asarray((u[RIGHT] - u[LEFT]) * height + (u[TOP] - u[BOTTOM]) * width)
-
-
 def inlet_share(case: Case, grid: Grid, inlet: Inlet) -> Floats:
     """Share of the flow through each column's wall facet that belongs to `inlet` (columns,); inlets may meet on a facet.
 

@@ -10,8 +10,9 @@ v_s, pore gas is carried at eps v_s. Gas layers have eps = 1, 1/K = 0 and U = u.
 outlets have p = 0 and no tangential velocity gradient. Where a bed passes the closed ends of a strip, u = 0 there and U = (1-eps) v_s.
 
 Discretisation: Raviart-Thomas of lowest order on quadrilaterals, the marker-and-cell scheme written as forms; the flux through every facet
-is one number. div u = 0 holds by construction, because the unknowns are a stream function psi (`mpm.flow.space`): with A and M the matrices
-of viscous terms and inertia, N the convection of the state before (`mpm.flow.convection`) and Z the curl, a step from u_p is
+is one number. div u = 0 holds by construction, because the unknowns are a stream function psi (`mpm.flow.space`). With A the matrix of
+viscosity and drag, M that of inertia, N the convection (`mpm.flow.convection`), f the forces of bed and frame and Z the curl, a step from
+the state u, which is u_p once the flows of its ports are those of the step, is
 
     Z^T (A + M/dt) Z dpsi = Z^T (f - N(u) - A u_p - M (u_p - u)/dt),    u' = u_p + Z dpsi,
 
@@ -36,6 +37,7 @@ from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import StepMotion
 from mpm.numerics.fem import PETSc, dolfinx
 from mpm.numerics.linear import DirectSolver, check
+from mpm.numerics.sparse import sparse_matrix
 from mpm.parallel import largest
 
 if TYPE_CHECKING:
@@ -199,10 +201,7 @@ class FlowProblem:
     def _exact_jacobian(self) -> PETSc.Mat:
         """Z^T (A + dN/du) Z at the present state."""
         rows, columns, values = self.convection.slope_matrix(self.values)
-        whole = PETSc.Mat().create(self.strip.comm)
-        whole.setSizes(self.viscous.getSizes())
-        whole.setType("aij")
-        whole.setPreallocationCOO(rows.astype(PETSc.IntType), columns.astype(PETSc.IntType))
+        whole = sparse_matrix(self.strip.comm, self.space.own, self.space.own, (rows, columns))
         whole.setValuesCOO(self.convection_share * values)
         whole.axpy(1.0, self.viscous)
         return whole.ptap(self.space.curl)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
 
 Watch = Callable[[int, float], None]  # of a cycle's number and what has changed since the one before
+SAME_STEP = 1e-12  # of a step: how far two lengths may lie apart by rounding
 
 
 class FlowSequence(Protocol):
@@ -40,6 +41,11 @@ class FlowSequence(Protocol):
         """Everything needed to go on, (fields, 5, own cells): four velocities and the pressure of each field."""
 
 
+def begins_at_rest(case: Case, schedule: Schedule) -> bool:
+    """Whether there are steps before the vibration starts, which have a field of their own; the steady state has no beginning."""
+    return schedule.resting_steps > 0 and case.fidelity != "steady"
+
+
 @dataclass(frozen=True, eq=False)
 class CyclicFlow:
     """A cycle that repeats: the field `at_rest` where the run begins without vibration, then one per phase, a mean being one phase."""
@@ -56,8 +62,7 @@ class CyclicFlow:
         Raises ConvergenceError.
         """
         problem = FlowProblem(case, strip, schedule.dt)
-        rests = schedule.resting_steps > 0 and case.fidelity != "steady"
-        at_rest = steady_flow(problem) if rests else None
+        at_rest = steady_flow(problem) if begins_at_rest(case, schedule) else None
         if case.fidelity == "resolved":
             phases = periodic_flow(problem, bed_motion, schedule.phases, watch)
         else:
@@ -142,6 +147,3 @@ class MarchedFlow:
         """Go on after `done` steps from the arrays of `stored` in grid order."""
         self.current, *self.recent = [FlowField.restored(self.strip, field) for field in stored]
         self.done = done
-
-
-SAME_STEP = 1e-12  # of a step: how far two lengths may lie apart by rounding

@@ -19,11 +19,13 @@ from mpm.arrays import Floats, Ints
 from mpm.errors import InputError
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 from mpm.numerics.fem import PETSc, dolfinx
+from mpm.numerics.sparse import sparse_matrix
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
 CLOSED, OPEN = 1, 2  # facet markers: walls and inlets, outlets
+ROUNDING = 1e-12  # of what flows through a wall: inlets that gain no more than this are in balance
 
 
 class FlowSpace:
@@ -62,9 +64,9 @@ class FlowSpace:
             strip.mesh, 1, facets[order].astype(np.int32), values[order].astype(np.int32)
         )
 
-    def function(self, name: str = "flow") -> dolfinx.fem.Function:
+    def function(self) -> dolfinx.fem.Function:
         """A field of fluxes, zero."""
-        return dolfinx.fem.Function(self.fluxes, name=name)
+        return dolfinx.fem.Function(self.fluxes)
 
     def along_x(self, per_cell: dolfinx.fem.Function) -> dolfinx.fem.Function:
         """The field that has a cell function's positive values as velocity along x in those cells, and is zero elsewhere."""
@@ -162,9 +164,6 @@ class FlowSpace:
         return np.asarray((whole - level).ravel()[strip.cell])
 
 
-ROUNDING = 1e-12  # of what flows through a wall
-
-
 class StreamFunction:
     """Numbers of the unknowns psi on the vertices of the grid, the same on every rank.
 
@@ -215,7 +214,7 @@ class StreamFunction:
             stretch = np.concatenate([[0], np.cumsum(is_open[:-1])])  # of each vertex, counted along the loop
             if not is_open[-1]:
                 stretch[stretch == stretch[-1]] = 0
-            group[places] = group[places[0]] + 0 * places if not is_open.any() else _shared(places, stretch)
+            group[places] = _shared(places, stretch)
         group[group == group[bottom[0]]] = 0
         return np.asarray(group)
 
@@ -258,12 +257,7 @@ def _curl(space: FlowSpace, psi: StreamFunction) -> PETSc.Mat:
         rows.append(first + passed)
         columns.append(np.full(len(passed), psi.upwards))
         values.append(path[passed])
-    curl = PETSc.Mat().create(strip.comm)
-    curl.setSizes(((space.own, None), (psi.count, None)))
-    curl.setType("aij")
-    curl.setPreallocationCOO(
-        np.concatenate(rows).astype(PETSc.IntType), np.concatenate(columns).astype(PETSc.IntType)
-    )
+    curl = sparse_matrix(strip.comm, space.own, psi.count, (np.concatenate(rows), np.concatenate(columns)))
     curl.setValuesCOO(np.concatenate(values))
     return curl
 

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
+
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.layers import Layer
     from mpm.case.materials import Material
 
-Floats = NDArray[np.float64]
 ON_EDGE = 1e-6  # of a column: places as close to each other are one
-Ints = NDArray[np.int64]
+HALF = 0.5 * (1.0 - 1e-9)  # of a facet, less what rounding may take of it
 
 
 class Span(Protocol):
@@ -108,11 +109,6 @@ class Grid:
     def length(self) -> float:
         return float(self.x[-1] - self.x[0])
 
-    @property
-    def volumes(self) -> Floats:
-        """Area of each cell, row by row [m2, that is m3 per metre of depth]."""
-        return np.repeat(self.dy, self.columns) * self.dx
-
     def per_row(self, value: Callable[[Material], float], gas: float) -> Floats:
         """What `value` says of the material of each row, (rows,); `gas` in rows without one."""
         by_layer = [gas if material is None else value(material) for material in self.materials]
@@ -132,7 +128,7 @@ class Grid:
     def opening(self, port: Span) -> NDArray[np.bool_]:
         """Columns whose wall facet is open: at least half of it covered by the port, or the one it covers most."""
         overlap = self.overlap(port)
-        is_open = overlap >= 0.5 * self.dx * (1.0 - 1e-9)
+        is_open = overlap >= HALF * self.dx
         if not is_open.any():
             is_open[np.argmax(overlap)] = True
         return is_open

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.mesh.grid import Grid
 from mpm.numerics.fem import dolfinx
 from mpm.parallel import Scatter, is_root
@@ -25,7 +26,6 @@ from mpi4py import MPI  # isort: skip
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Ints = NDArray[np.int64]
 BOTTOM, LEFT, RIGHT, TOP = range(4)  # local facet numbers of a quadrilateral with tensor-ordered corners
 TAG = 1304  # of the messages in which ranks tell each other which nodes they share; any number that no other exchange has
 
@@ -46,9 +46,9 @@ class Faces:
 class Strip:
     """The distributed mesh of a case.
 
-    `mesh` is the dolfinx mesh; `cell` (local cells incl. ghosts,) gives each cell's number in the grid, `owned` the number of own
-    cells, `facets` (local cells, 4) the facets of each cell as bottom, left, right, top. `scatter` moves cell values to and from
-    grid order.
+    `mesh` is the dolfinx mesh; of its cells this rank has `local`, ghosts included, and the first `owned` are its own. `cell` (local,) is
+    each one's number in `grid`, `row` and `column` its place there, `global_cell` its number among those of all ranks; `facets` (local, 4)
+    are its facets as bottom, left, right, top, `faces` those between two cells. `scatter` moves own cell values to and from grid order.
     """
 
     def __init__(self, case: Case, comm: MPI.Comm):
@@ -113,7 +113,7 @@ class Strip:
         last = np.flatnonzero(self.column[: self.owned] == self.grid.columns - 1)
         return np.concatenate([self.facets[first, LEFT], self.facets[last, RIGHT]])
 
-    def cell_function(self, per_row: NDArray[np.float64], name: str) -> dolfinx.fem.Function:
+    def cell_function(self, per_row: Floats, name: str) -> dolfinx.fem.Function:
         """A DG0 function whose value depends on the row alone."""
         function = dolfinx.fem.Function(dolfinx.fem.functionspace(self.mesh, ("DG", 0)), name=name)
         dofs = function.function_space.dofmap.list[:, 0]
@@ -170,7 +170,7 @@ def cell_nodes(grid: Grid) -> Ints:
     return np.column_stack([left, right, left + per_row, right + per_row])
 
 
-def node_places(grid: Grid) -> NDArray[np.float64]:
+def node_places(grid: Grid) -> Floats:
     """Places (n, 2) [m] of the nodes that `cell_nodes` counts; those of a seam, which has two, at the left-hand end."""
     x, y = np.meshgrid(grid.x[: _nodes_per_row(grid)], grid.y)
     return np.column_stack([x.ravel(), y.ravel()])

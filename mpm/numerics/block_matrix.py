@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mpm.numerics.fem import PETSc
+from mpm.arrays import Floats, Ints
+from mpm.numerics.sparse import sparse_matrix
 
-from mpi4py import MPI  # isort: skip  (after fem)
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
 
 class Unknowns:
@@ -66,10 +63,7 @@ class BlockMatrix:
         self.names = list(couplings)
         entries = [coupling.entries() for coupling in couplings.values()]
         rows, columns = (np.concatenate(side) for side in zip(*entries, strict=True))
-        self.matrix = PETSc.Mat().create(unknowns.comm)
-        self.matrix.setSizes(((unknowns.local, None), (unknowns.local, None)))
-        self.matrix.setType("aij")
-        self.matrix.setPreallocationCOO(rows.astype(PETSc.IntType), columns.astype(PETSc.IntType))
+        self.matrix = sparse_matrix(unknowns.comm, unknowns.local, unknowns.local, (rows, columns))
 
     def fill(self, values: Mapping[str, Floats]) -> None:
         """Enter all blocks anew, (blocks, height, width) by name; collective."""

@@ -10,8 +10,6 @@ REASONS = {
     for name, value in vars(PETSc.KSP.ConvergedReason).items()
     if not name.startswith("_") and isinstance(value, int)
 }
-
-
 METIS = 5  # MUMPS: nested dissection; its own choice needs 1.8 times the memory here
 # MUMPS: no ScaLAPACK for the last front, which is small in two dimensions: 8 % less memory, as fast
 SEQUENTIAL_ROOT = 1
@@ -20,6 +18,7 @@ SPARE = (5, 20, 100, 500)
 # levels of fill-in of a factor that is none but complete: PETSc's own, by nested dissection. Of one unknown per cell it is as fast to make
 # as that of MUMPS and solves in a fifth of the time (49,731 cells: 0.16 s, then 2.5 ms instead of 11 to 14)
 COMPLETE = -1
+ITERATIONS = 200  # of a Krylov solver, before it counts as failed
 FACTOR_FAILED = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
 
 
@@ -75,11 +74,11 @@ class KrylovSolver:
     hundreds. On one rank such a factor solves by itself.
     """
 
-    def __init__(self, matrix: PETSc.Mat, name: str, tolerance: float, iterations: int = 200, fill: int = 0):
+    def __init__(self, matrix: PETSc.Mat, name: str, tolerance: float, fill: int = 0):
         self.name = name
         self.ksp = PETSc.KSP().create(matrix.comm)
         self.ksp.setOperators(matrix)
-        self.ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=iterations)
+        self.ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=ITERATIONS)
         alone = matrix.comm.size == 1
         self.ksp.setType("preonly" if alone and fill == COMPLETE else "bcgs")
         self._blocks = not alone  # to be told of `fill`; they exist once there is a matrix to solve with

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mpm.arrays import Floats, Ints
+
 TRIES = 15  # Newton iterations in a cell
 TIGHT = 1e-12  # residual of a cell over what passes through it
 SHRINK = 0.05  # smallest factor on a concentration per iteration, which keeps it positive

@@ -19,12 +19,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpm.arrays import Floats
 from mpm.physics.exponentials import dphi1, dphi2, phi1, phi2
 
 if TYPE_CHECKING:
     from mpm.physics.mechanism import Mechanism
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

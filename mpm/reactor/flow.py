@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.arrays import Floats
 from mpm.errors import InputError
-from mpm.flow.sequence import CyclicFlow, FlowSequence, MarchedFlow, Watch
+from mpm.flow.sequence import CyclicFlow, FlowSequence, MarchedFlow, Watch, begins_at_rest
 from mpm.transport.dispersion import vibrational_dispersion
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def conditions(case: Case, schedule: Schedule) -> dict[str, Any]:
         "outlet": [(port.side, port.x0, port.x1) for port in geometry.outlets],
         "gas": (case.gas.density, case.gas.viscosity),
         "motion": case.motion,
-        "fidelity": (schedule.phases, schedule.resting_steps > 0 and case.fidelity != "steady"),
+        "fidelity": (schedule.phases, begins_at_rest(case, schedule)),
     }
 
 

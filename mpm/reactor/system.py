@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
-from mpm.flow.sequence import CyclicFlow, MarchedFlow, Watch
+from mpm.flow.sequence import CyclicFlow, MarchedFlow, Watch, begins_at_rest
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
@@ -169,7 +169,8 @@ class System:
             marched = MarchedFlow(self.case, self.strip, self.bed_motion, self.schedule)
             marched.restore(stored["fields"], int(stored["done"]))
             return Flow(marched, known)
-        cyclic = CyclicFlow.restored(self.strip, stored["fields"], self.schedule.resting_steps > 0)
+        rests = begins_at_rest(self.case, self.schedule)
+        cyclic = CyclicFlow.restored(self.strip, stored["fields"], rests)
         if "dispersion" not in stored:
             return Flow(cyclic, known)
         dispersion = stored["dispersion"][:, :, self.strip.cell]

@@ -10,13 +10,11 @@ replaced by those at which every cell balances with that inflow: uptake up to wh
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.reactor.steady.system import Iterate, SteadySystem
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 NEGLIGIBLE = 1e-18  # of the largest feed, over the number of cells: a residual that needs no work
 
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.reactor.steady.system import Iterate, SteadySystem
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Floats = NDArray[np.float64]
 FEWEST = 10_000  # cells from which a coarser mesh saves more steps than it costs
 THINNEST = 2  # rows that a layer keeps, if it has them
 

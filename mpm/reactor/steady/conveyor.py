@@ -11,17 +11,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.parallel import total
 
 if TYPE_CHECKING:
     from mpm.physics.kinetics import SurfaceKinetics
     from mpm.reactor.system import System
     from mpm.transport.coverage import Coverage
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Conveyor:
@@ -103,19 +100,15 @@ class Conveyor:
         local[: kinds * kinds, moving] = np.concatenate(responses)  # column by column of M
         local[kinds * kinds :, moving] = old[:, moving]
         whole = self.whole(local)[:, coverage.moving_rows]
-        maps = np.moveaxis(
-            whole[: kinds * kinds].reshape(kinds, kinds, *whole.shape[1:]), (0, 1, 2, 3), (3, 2, 1, 0)
-        )  # (columns, rows, out, in)
-        aged = (1.0 - share) * np.moveaxis(
-            whole[kinds * kinds :], (0, 1, 2), (2, 1, 0)
-        )  # (columns, rows, sites)
+        maps = whole[: kinds * kinds].reshape(kinds, kinds, *whole.shape[1:]).T  # (columns, rows, out, in)
+        aged = (1.0 - share) * whole[kinds * kinds :].T  # (columns, rows, sites)
         way = self.direction  # columns in the order in which solids meet them
         left = np.empty_like(aged)
         left[::way] = _along(
             maps[::way], aged[::way], share, coverage.fresh[:, coverage.moving_rows].T, coverage.periodic
         )
         result = np.zeros((kinds, len(coverage.rows), coverage.columns))
-        result[:, coverage.moving_rows] = np.moveaxis(left, (0, 1, 2), (2, 1, 0))
+        result[:, coverage.moving_rows] = left.T
         new = theta.copy()
         new[:, moving] = coverage.scatter.to_local(result.reshape(kinds, -1))[:, moving]
         return new
@@ -128,9 +121,8 @@ def _along(maps: Floats, aged: Floats, share: float, fresh: Floats, periodic: bo
     for column, (m, more) in enumerate(zip(maps, aged, strict=True)):
         incoming = np.einsum("roi,ri->ro", m, share * incoming + more)
         incoming = np.maximum(incoming, 0.0)
-        incoming = left[column] = incoming / incoming.sum(
-            axis=1, keepdims=True
-        )  # rounding would add up along the bed
+        # rounding would add up along the bed
+        incoming = left[column] = incoming / incoming.sum(axis=1, keepdims=True)
     return left
 
 

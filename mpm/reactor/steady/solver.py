@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.numerics.linear import DirectSolver
 from mpm.parallel import any_rank, largest
@@ -26,7 +26,6 @@ from mpm.transport.reactions import Events
 from mpm.transport.species import Transport
 from mpm.transport.tracers import steady_fields
 
-Floats = NDArray[np.float64]
 Watch = Callable[[int, float], None]  # of a Newton step's number and the residual after it
 CONVERGED = 1e-11  # sum of |residual| over the largest feed
 ROUNDING = 1e-10  # accepted when nothing improves any more
@@ -185,7 +184,7 @@ class SteadySolver:
         here = int(largest(strip.comm, [float(strip.cell[cell]) if cell >= 0 else -1.0])[0])
         grid = strip.grid
         row, column = divmod(here, grid.columns)
-        x, y = grid.centres[column], 0.5 * (grid.y[row] + grid.y[row + 1])
+        x, y = grid.centres[column], grid.row_centres[row]
         return ConvergenceError(
             f"steady state: Newton stopped after {self.iterations} iterations, at a pseudo-time step of {step:.2g} s, at a residual of "
             f"{at.size:.3g} of the feed, worst at x = {1e3 * x:.2f} mm, y = {1e3 * y:.2f} mm; "

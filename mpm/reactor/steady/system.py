@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.numerics.block_matrix import BlockMatrix, Coupling, Unknowns
 from mpm.parallel import is_root, total
 from mpm.reactor.steady.conveyor import Conveyor
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from mpm.reactor.system import System
     from mpm.transport.fluxes import PortFlux
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 LAST_STEP = 1e12  # s, shortest last pseudo-time step
 STORED = 1e-10  # of the largest feed: what the solids at rest may still take up over the last step
 
@@ -61,12 +59,8 @@ class SteadySystem:
     """Residual and Jacobian of a reactor's `system` in its steady flow. At least one species that reacts is fed."""
 
     def __init__(self, system: System):
-        self.system, self.strip, self.transport, self.coverage = (
-            system,
-            system.strip,
-            system.transport,
-            system.coverage,
-        )
+        self.system, self.strip = system, system.strip
+        self.transport, self.coverage = system.transport, system.coverage
         self.ports, self.reactions = self.transport.ports, self.transport.reactions
         self.conveyor = Conveyor(system)
         self.coupled, self.own = self.transport.coupled, self.strip.owned
@@ -91,9 +85,7 @@ class SteadySystem:
                 "outlets": self.coupled * len(self._drawing) if is_root(self.strip.comm) else 0,
             },
         )
-        self._linked = np.flatnonzero(
-            self.conveyor.inside
-        )  # moving cells that get their solids from another one
+        self._linked = np.flatnonzero(self.conveyor.inside)  # moving cells fed with solids by another one
         self.jacobian = BlockMatrix(self.unknowns, self._couplings())
 
     # --- unknowns ---
@@ -177,9 +169,8 @@ class SteadySystem:
         blocks = -reactions.slopes(at.surface_slopes, at.gas_slopes)
         for i in range(self.coupled):
             blocks[:, i, i] += self.outflow[i] + self.storage / step
-        share = (
-            self.conveyor.span(step) / self.conveyor.residence
-        )  # of the entering solids that come from upstream
+        # of the entering solids that come from upstream
+        share = self.conveyor.span(step) / self.conveyor.residence
         # the last kind of site is 1 less the others
         rates_theta = (conveyed.rates_theta[:, :free] - conveyed.rates_theta[:, free:]) * share
         out_theta = (conveyed.out_theta[:free, :free] - conveyed.out_theta[:free, free:]) * share
