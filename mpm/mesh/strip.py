@@ -34,10 +34,9 @@ TAG = 1304  # of the messages in which ranks tell each other which nodes they sh
 class Faces:
     """Faces between two cells, seen along the axes: flow from `behind` to `ahead` is positive.
 
-    `facet` (n,) local facet numbers, `behind`, `ahead` local cells, `vertical_flow` (n,) True where the normal is y.
+    `behind`, `ahead` (n,) local cells, `vertical_flow` (n,) True where the normal is y.
     """
 
-    facet: Ints
     behind: Ints
     ahead: Ints
     vertical_flow: NDArray[np.bool_]
@@ -94,7 +93,7 @@ class Strip:
         vertical[self.facets[:, BOTTOM]] = True
         inner = np.flatnonzero((behind >= 0) & (ahead >= 0))
         mine = inner[(behind[inner] < self.owned) | (ahead[inner] < self.owned)]
-        return Faces(mine, behind[mine], ahead[mine], vertical[mine])
+        return Faces(behind[mine], ahead[mine], vertical[mine])
 
     def wall_cells(self, side: str) -> Ints:
         """Own cells along the bottom or top wall."""

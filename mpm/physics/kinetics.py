@@ -41,37 +41,33 @@ class Exposure:
 
 
 class SurfaceKinetics:
-    """Surface reactions in `n` cells with area `surface` S [1/m] and `sites` n_s [mol/m2], temperature [K] scalar or per cell."""
+    """Surface reactions in cells with `sites` n_s (n,) [mol/m2], among the `coupled` gases; temperature [K] scalar or per cell."""
 
     def __init__(
         self,
         mechanism: Mechanism,
         coupled: tuple[str, ...],
-        surface: Floats,
         sites: Floats,
         temperature: ArrayLike,
     ):
-        self.coupled, self.surface, self.sites = coupled, surface, sites
+        self.sites = sites
         names = mechanism.site_names
         self.reactions = mechanism.running_surface(coupled)
         self.gas = [coupled.index(r.gas) for r in self.reactions]
         self.site = [names.index(r.site) for r in self.reactions]
         molar_mass = {s.name: s.molar_mass for s in mechanism.species}
-        t = np.broadcast_to(np.asarray(temperature, dtype=float), surface.shape)
+        t = np.broadcast_to(np.asarray(temperature, dtype=float), sites.shape)
         self.constant = [
             np.asarray(r.rate_constant(t, molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions
         ]
         self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
             -1, len(names)
         )
-        self.nu_gas = np.array([[r.nu_gas.get(k, 0.0) for k in coupled] for r in self.reactions]).reshape(
-            len(self.reactions), len(coupled)
-        )
 
     def part(self, chosen: NDArray[np.integer]) -> SurfaceKinetics:
         """The same reactions in some of the cells."""
         other = copy.copy(self)
-        other.surface, other.sites = self.surface[chosen], self.sites[chosen]
+        other.sites = self.sites[chosen]
         other.constant = [constant[chosen] for constant in self.constant]
         return other
 
@@ -217,7 +213,6 @@ class GasKinetics:
     """
 
     def __init__(self, mechanism: Mechanism, coupled: tuple[str, ...], temperature: ArrayLike):
-        self.coupled = coupled
         self.reactions = mechanism.running_gas(coupled)
         self.constant = [r.rate_constant(np.asarray(temperature, dtype=float)) for r in self.reactions]
         self.pairs = [(coupled.index(a), coupled.index(b)) for a, b in (r.reactants for r in self.reactions)]

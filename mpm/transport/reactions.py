@@ -47,9 +47,7 @@ class Reactions:
         self.strip, self.coverage = strip, coverage
         self.species, self.coupled = (*roles.coupled, *roles.products), len(roles.coupled)
         temperature = case.gas.temperature
-        self.surface = SurfaceKinetics(
-            case.mechanism, roles.coupled, coverage.surface, coverage.sites, temperature
-        )
+        self.surface = SurfaceKinetics(case.mechanism, roles.coupled, coverage.sites, temperature)
         self.gas = GasKinetics(case.mechanism, roles.coupled, temperature)
         self._nu_surface = self._stoichiometry(self.surface.reactions)
         self._nu_gas = self._stoichiometry(self.gas.reactions)
