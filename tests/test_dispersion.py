@@ -137,6 +137,25 @@ def test_restart_keeps_dispersion(tmp_path: Path) -> None:
     assert_same_numbers(whole.summary, resumed.summary, 1e-10)
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"time.steps_per_cycle": 16},
+        {"material.glass_beads.tortuosity_factor": 3.0},
+        {"geometry.inlet_diffusion": True},
+    ],
+)
+def test_flow_brings_no_dispersion_of_another_case(changes: dict[str, Any]) -> None:
+    """Fails when a flow that is handed on brings a dispersion that was found with other steps, pores or inlets than this case's."""
+    known = Reactor(zone(ON, TINY), MPI.COMM_SELF).flow
+    case = zone({**ON, **changes}, TINY)
+    handed = Reactor(case, MPI.COMM_SELF, flow=known).flow
+    own = Reactor(case, MPI.COMM_SELF).flow
+    assert handed.sequence is known.sequence
+    assert handed.dispersion is not None and own.dispersion is not None
+    np.testing.assert_allclose(handed.dispersion, own.dispersion, rtol=1e-9)
+
+
 def test_resolved_run_refuses_the_option() -> None:
     """Fails when vibration could be counted twice."""
     with pytest.raises(InputError, match=r"vibrational_dispersion.*resolved"):

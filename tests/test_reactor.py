@@ -13,7 +13,7 @@ import pytest
 
 import mpm.transport.species
 from mpm.case.case import Case
-from mpm.errors import ConvergenceError
+from mpm.errors import ConvergenceError, InputError
 from mpm.reactor.reactor import Reactor
 from mpm.transport.cell_matrix import StepMatrix
 
@@ -345,3 +345,24 @@ def test_newton_failure_keeps_the_last_good_state(monkeypatch: pytest.MonkeyPatc
     _, resumed = run(case, output=tmp_path / "failed", resume=True)
     assert_same_numbers(undisturbed.summary, resumed.summary, 1e-12)
     np.testing.assert_array_equal(undisturbed.history["time"], resumed.history["time"])
+
+
+AVERAGED_IMPULSE = {**SHORT, "motion.gamma": 0.0, "motion.startup": "impulsive"}
+
+
+def test_a_transient_takes_no_flow_of_another_run() -> None:
+    """Fails when a run that begins from rest replays the developed flow that it is handed, its steps and forcing being the same."""
+    developed = Reactor(zone(AVERAGED_IMPULSE, TINY), MPI.COMM_SELF).flow
+    with pytest.raises(InputError, match="another fidelity"):
+        Reactor(zone({**AVERAGED_IMPULSE, "fidelity": "resolved"}, TINY), MPI.COMM_SELF, flow=developed)
+
+
+@pytest.mark.parallel
+def test_flow_of_other_ranks_is_refused() -> None:
+    """Fails when a reactor takes the flow of one that is spread over other ranks for that of its own cells."""
+    case = zone(SHORT, TINY)
+    flow = Reactor(case, MPI.COMM_WORLD).flow
+    assert Reactor(case, MPI.COMM_WORLD, flow=flow).flow.sequence is flow.sequence
+    if MPI.COMM_WORLD.size > 1:
+        with pytest.raises(InputError, match="other ranks"):
+            Reactor(case, MPI.COMM_SELF, flow=flow)

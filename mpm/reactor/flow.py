@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from mpm.arrays import Floats
+import numpy as np
+
+from mpm.arrays import Floats, Ints
 from mpm.errors import InputError
 from mpm.flow.sequence import CyclicFlow, FlowSequence, MarchedFlow, Watch, begins_at_rest
+from mpm.parallel import any_rank
 from mpm.transport.dispersion import vibrational_dispersion
 
 if TYPE_CHECKING:
@@ -19,13 +22,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """The velocity fields of a run with the `dispersion` (diffusivities, 2, local cells) [m2/s] that vibration adds for gases of these
-    `diffusivities` [m2/s], None without; `conditions` are those that the fields depend on."""
+    """The velocity fields of a run in the local `cells` of the grid, and the `dispersion` (diffusivities, 2, local cells) [m2/s] that
+    vibration adds, None without; `conditions` are those that the fields depend on, `dispersed_in` those of the dispersion beyond them."""
 
     sequence: FlowSequence
+    cells: Ints
     conditions: dict[str, Any]
     dispersion: Floats | None = None
-    diffusivities: tuple[float, ...] = ()
+    dispersed_in: dict[str, Any] | None = None
 
 
 def find_flow(
@@ -37,7 +41,7 @@ def find_flow(
         sequence = MarchedFlow(case, strip, bed_motion, schedule)
     else:
         sequence = CyclicFlow.solve(case, strip, bed_motion, schedule, watch)
-    return Flow(sequence, conditions(case, schedule))
+    return Flow(sequence, strip.cell, conditions(case, schedule))
 
 
 def dispersed(
@@ -52,15 +56,18 @@ def dispersed(
 
     Raises ConvergenceError.
     """
-    wanted = tuple(diffusivities) if case.transport.vibrational_dispersion and not _is_marched(case) else ()
-    if wanted == flow.diffusivities:
+    wanted = dispersion_conditions(case, diffusivities)
+    if wanted == flow.dispersed_in:
         return flow
-    found = vibrational_dispersion(case, strip, bed_motion, wanted, watch) if wanted else None
-    return replace(flow, dispersion=found, diffusivities=wanted)
+    found = None if wanted is None else vibrational_dispersion(case, strip, bed_motion, diffusivities, watch)
+    return replace(flow, dispersion=found, dispersed_in=wanted)
 
 
-def taken_over(flow: Flow, case: Case, schedule: Schedule) -> Flow:
-    """`flow`, found for another case; species and doses may differ. Raises InputError where it would be another one for `case`."""
+def taken_over(flow: Flow, case: Case, strip: Strip, schedule: Schedule) -> Flow:
+    """`flow`, found for another case; species and doses may differ. Raises InputError where it would be another one for `case`.
+
+    Collective.
+    """
     if isinstance(flow.sequence, MarchedFlow):
         raise InputError(
             "flow: found a transient, which belongs to one run; accepted: the flow of a developed run"
@@ -70,6 +77,8 @@ def taken_over(flow: Flow, case: Case, schedule: Schedule) -> Flow:
             raise InputError(
                 f"flow: found that of another {name}; accepted: that of a case which differs in species and doses only"
             )
+    if any_rank(strip.comm, not np.array_equal(flow.cells, strip.cell)):
+        raise InputError("flow: found that of other ranks; accepted: that of a reactor on as many ranks")
     return flow
 
 
@@ -87,7 +96,19 @@ def conditions(case: Case, schedule: Schedule) -> dict[str, Any]:
         "outlet": [(port.side, port.x0, port.x1) for port in geometry.outlets],
         "gas": (case.gas.density, case.gas.viscosity),
         "motion": case.motion,
-        "fidelity": (schedule.phases, begins_at_rest(case, schedule)),
+        "fidelity": (schedule.phases, begins_at_rest(case, schedule), _is_marched(case)),
+    }
+
+
+def dispersion_conditions(case: Case, diffusivities: list[float]) -> dict[str, Any] | None:
+    """What the dispersion of gases with these `diffusivities` [m2/s] depends on beside the flow; None where the case has none."""
+    if not diffusivities or not case.transport.vibrational_dispersion or _is_marched(case):
+        return None
+    return {
+        "diffusivities": list(diffusivities),
+        "steps per cycle": case.time.steps_per_cycle,
+        "tortuosity": [layer.material and layer.material.tortuosity_factor for layer in case.geometry.layers],
+        "inlet diffusion": case.geometry.inlet_diffusion,
     }
 
 

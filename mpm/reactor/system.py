@@ -12,7 +12,7 @@ from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
 from mpm.numerics import fem
 from mpm.parallel import on_root, total
-from mpm.reactor.flow import Flow, conditions, dispersed, find_flow, taken_over
+from mpm.reactor.flow import Flow, conditions, dispersed, dispersion_conditions, find_flow, taken_over
 from mpm.transport.coverage import Coverage
 from mpm.transport.species import Operators, Transport
 
@@ -74,7 +74,7 @@ class System:
         if known is None:
             known = find_flow(case, strip, motion, self.schedule, watch)
         else:
-            known = taken_over(known, case, self.schedule)
+            known = taken_over(known, case, strip, self.schedule)
         flow = dispersed(known, case, strip, motion, self.transport.diffusivities, watch)
         self._use(flow)
         return flow
@@ -168,10 +168,11 @@ class System:
         if "done" in stored:
             marched = MarchedFlow(self.case, self.strip, self.bed_motion, self.schedule)
             marched.restore(stored["fields"], int(stored["done"]))
-            return Flow(marched, known)
+            return Flow(marched, self.strip.cell, known)
         rests = begins_at_rest(self.case, self.schedule)
         cyclic = CyclicFlow.restored(self.strip, stored["fields"], rests)
         if "dispersion" not in stored:
-            return Flow(cyclic, known)
+            return Flow(cyclic, self.strip.cell, known)
         dispersion = stored["dispersion"][:, :, self.strip.cell]
-        return Flow(cyclic, known, dispersion, tuple(self.transport.diffusivities))
+        dispersed_in = dispersion_conditions(self.case, self.transport.diffusivities)
+        return Flow(cyclic, self.strip.cell, known, dispersion, dispersed_in)
