@@ -359,9 +359,9 @@ def test_numerical_failure_ends_with_status_3(tmp_path: Path) -> None:
     case = zone({**SHORT, "time.end": "0.6 s"}, TINY)
     spoil = (
         "import mpm.transport.species as t; advance = t.Transport.advance\n"
-        "def spoilt(self, number, t0, t1, halvings=0):\n"
+        "def spoilt(self, operators, t0, *more, **options):\n"
         "    t.NEWTON_LIMIT = 1 if t0 > 0.3 else 30\n"
-        "    return advance(self, number, t0, t1, halvings)\n"
+        "    return advance(self, operators, t0, *more, **options)\n"
         "t.Transport.advance = spoilt"
     )
     line = finish(start(case, tmp_path, before=spoil), 3)

@@ -41,6 +41,13 @@ def balance_locally(
         matrix = -slope[loose]
         for i in range(b):
             matrix[:, i, i] += diagonal[i, active]
-        change = np.linalg.solve(matrix, residual[:, loose].T[:, :, None])[:, :, 0].T
+        change = _solved(matrix, residual[:, loose])
         c[:, active] = np.maximum(np.maximum(c[:, active] - change, SHRINK * c[:, active]), LOWEST)
     return c
+
+
+def _solved(matrix: Floats, rhs: Floats) -> Floats:
+    """x (b, n) of `matrix` (n, b, b) x = `rhs` (b, n) in every cell; of one unknown it is a division."""
+    if len(rhs) == 1:
+        return rhs / matrix[:, 0, 0]
+    return np.asarray(np.linalg.solve(matrix, rhs.T[:, :, None])[:, :, 0].T)

@@ -135,7 +135,7 @@ class System:
         transport, scatter, sequence = self.transport, self.strip.scatter, self.flow.sequence
         dispersion = self.flow.dispersion
         parts: dict[str, dict[str, Any]] = {
-            "species": {"concentration": scatter.to_root(transport.concentration)},
+            "species": transport.stored(scatter),
             "ledger": transport.ledger.stored(self.comm, scatter, self.coverage.scatter),
             "coverage": self.coverage.stored(),
             "flow": {"fields": scatter.to_root(sequence.stored(self.strip.owned))},
@@ -154,7 +154,7 @@ class System:
             part, _, inside = name.partition(".")
             parts.setdefault(part, {})[inside] = value
         transport, strip = self.transport, self.strip
-        transport.concentration = strip.scatter.to_local(parts["species"]["concentration"])
+        transport.restore(strip.scatter, parts["species"])
         transport.ledger.restore(self.comm, strip.scatter, self.coverage.scatter, parts["ledger"])
         self.coverage.restore(parts["coverage"])
         self.sites_initially, self.stored_initially = (

@@ -49,9 +49,9 @@ class Coverage:
     """Coverages `theta` (sites, n) of the solids in this rank's `cells`, those with reactive surface; nobody else writes them.
 
     `rows` are the grid's rows with reactive solids, `place` (n,) the index of each cell's row among them, `moving_rows` those that slide.
-    `surface` S [1/m] and `sites` n_s [mol/m2] per cell, `fresh` (sites, rows) what solids come in with. `distance` [m] is how far the bed
-    has slid, `shifted` by how many columns; `passed` counts, per site species, the sites that have left at the right minus those that came
-    in at the left (or the reverse for a negative number) [mol/m]; zero where the solids are periodic.
+    `surface` S [1/m], `area` [m2 per metre of depth] and `sites` n_s [mol/m2] per cell, `fresh` (sites, rows) what solids come in with.
+    `distance` [m] is how far the bed has slid, `shifted` by how many columns; `passed` counts, per site species, the sites that have left
+    at the right minus those that came in at the left (or the reverse for a negative number) [mol/m]; zero where the solids are periodic.
     """
 
     def __init__(self, case: Case, strip: Strip):
@@ -72,6 +72,7 @@ class Coverage:
         )
         self._row_surface, self._row_sites = surface[self.rows], density[self.rows]
         self.surface, self.sites = self._row_surface[self.place], self._row_sites[self.place]
+        self.area = np.asarray(self.surface * strip.volume[self.cells])
         self.periodic = case.geometry.bed_inflow == "periodic"
         self._theta = np.ascontiguousarray(self.fresh[:, self.place])
         self.distance = 0.0
@@ -84,11 +85,6 @@ class Coverage:
     def theta(self) -> Floats:
         """The coverages; an array that is replaced, never changed in place."""
         return self._theta
-
-    @property
-    def area(self) -> Floats:
-        """Reactive area in each cell [m2 per metre of depth]."""
-        return np.asarray(self.surface * self.strip.volume[self.cells])
 
     @property
     def capacity(self) -> Floats:

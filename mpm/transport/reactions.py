@@ -73,10 +73,10 @@ class Reactions:
         """From rates per area (reactions, reactive cells) [mol/m2/s] and per volume of gas (reactions, own) [mol/m3/s]."""
         return Events(surface_rates * self.coverage.area, gas_rates * self.gas_volume)
 
-    def made(self, events: Events) -> Floats:
-        """What they make of every species, (species, own) [mol/m/s]."""
-        made = self._nu_gas.T @ events.gas
-        made[:, self.coverage.cells] += self._nu_surface.T @ events.surface
+    def made(self, events: Events, species: slice = slice(None)) -> Floats:
+        """What they make of every one of these species, (species, own) [mol/m/s]."""
+        made = np.asarray(self._nu_gas[:, species].T @ events.gas)
+        made[:, self.coverage.cells] += self._nu_surface[:, species].T @ events.surface
         return made
 
     def slopes(self, surface_slopes: Floats, gas_slopes: Floats) -> Floats:
@@ -105,4 +105,6 @@ class Reactions:
 
 def _slopes(nu: Floats, slopes: Floats, size: Floats) -> Floats:
     """sum_r nu_ri slopes_rj, per cell and times its size: (n, i, j) from (reactions, i) and (reactions, j, n)."""
+    if not len(nu):
+        return np.zeros((len(size), nu.shape[1], slopes.shape[1]))
     return np.asarray(np.einsum("ri,rjn->nij", nu, slopes) * size[:, None, None])
