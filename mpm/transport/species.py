@@ -45,7 +45,9 @@ FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
 QUADRATIC = (
     0.3  # inner tolerance over the residual: the next residual is about the square of this one in any case
 )
-LAST = 1e-2 * RESIDUAL  # what the inner tolerance aims at, and no further
+LAST = (
+    1e-5 * RESIDUAL
+)  # what the inner tolerance aims at, and no further: traces far from their inlet are reported too
 HALVINGS = 6
 BALANCED = 1e-4  # residual below which Newton's steps have no need of balanced cells
 NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
