@@ -96,7 +96,7 @@ def _strip(case: Case) -> dict[str, Any]:
     geometry = case.geometry
     return {
         "length": geometry.length,
-        "height": sum(layer.height for layer in geometry.layers),
+        "height": geometry.height,
         "ends": "periodic" if geometry.periodic else "walls",
         "bed_inflow": geometry.bed_inflow,
         "bed_direction": "right" if case.direction > 0 else "left",

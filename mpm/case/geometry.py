@@ -65,6 +65,16 @@ class Geometry(Frozen):
         return self.length / self.columns
 
     @property
+    def height(self) -> float:
+        """Height of the strip [m]."""
+        return sum(layer.height for layer in self.layers)
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the mesh."""
+        return self.columns * sum(layer.cells for layer in self.layers)
+
+    @property
     def moving_layer(self) -> Layer | None:
         """The layer that is conveyed, if any."""
         return next((layer for layer in self.layers if layer.moving), None)
@@ -85,9 +95,10 @@ class Geometry(Frozen):
             raise reject(
                 f"{self.columns} columns", "at least 3 columns in a periodic strip", key="cell_width"
             )
-        cells = self.columns * sum(layer.cells for layer in self.layers)
-        if cells > MOST_CELLS:
-            raise reject(f"{cells:.2g} cells", f"a mesh of at most {MOST_CELLS:.0e} cells", key="cell_width")
+        if self.cells > MOST_CELLS:
+            raise reject(
+                f"{self.cells:.2g} cells", f"a mesh of at most {MOST_CELLS:.0e} cells", key="cell_width"
+            )
         check_sizes(self.layers, length=self.length, dx=self.dx)
         _check_names("layer", self.layers)
         _check_names("port", self.ports)

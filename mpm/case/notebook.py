@@ -19,12 +19,14 @@ def case_html(case: CaseTables) -> str:
 def case_rows(case: CaseTables) -> list[tuple[str, str]]:
     """What one asks first of a case, each value with its unit."""
     geometry, motion = case.geometry, case.motion
-    height = sum(layer.height for layer in geometry.layers)
     ends = "periodic ends" if geometry.periodic else "walls at its ends"
     until = "" if case.fidelity == "steady" else f", 0 s to {number(case.time.end, 's')}"
     rows = [
         ("fidelity", case.fidelity + until),
-        ("strip", f"{number(geometry.length * 1e3, 'mm')} long, {number(height * 1e3, 'mm')} high, {ends}"),
+        (
+            "strip",
+            f"{number(geometry.length * 1e3, 'mm')} long, {number(geometry.height * 1e3, 'mm')} high, {ends}",
+        ),
     ]
     for layer in reversed(geometry.layers):
         moves = f", moves at {number(case.conveying_velocity * 1e2, 'cm/s')}" if layer.moving else ""

@@ -30,8 +30,7 @@ def driving_speed(case: Case) -> float:
     fastest = max([moved, *(abs(inlet.velocity) + swing for inlet in geometry.inlets)])
     if not geometry.outlets:
         return fastest
-    height = sum(layer.height for layer in geometry.layers)
-    volume = sum(abs(inlet.velocity) * inlet.width for inlet in geometry.inlets) + moved * height
+    volume = sum(abs(inlet.velocity) * inlet.width for inlet in geometry.inlets) + moved * geometry.height
     return max(fastest, volume / min(outlet.width for outlet in geometry.outlets))
 
 

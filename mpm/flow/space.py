@@ -108,9 +108,8 @@ class FlowSpace:
             )
         for side, opening in open_columns:
             wall[side][opening] += (1.0 if side == "top" else -1.0) * gained / count
-        height = float(grid.y[-1] - grid.y[0])
-        level = (grid.y - grid.y[0]) / height
-        along = np.concatenate([[0.0], np.cumsum((wall["bottom"] - wall["top"]) * grid.dx / height)])
+        level = (grid.y - grid.y[0]) / grid.height
+        along = np.concatenate([[0.0], np.cumsum((wall["bottom"] - wall["top"]) * grid.dx / grid.height)])
         strip = self.strip
         row, column = strip.row, strip.column
         field = np.zeros(len(self.weights))

@@ -109,6 +109,10 @@ class Grid:
     def length(self) -> float:
         return float(self.x[-1] - self.x[0])
 
+    @property
+    def height(self) -> float:
+        return float(self.y[-1] - self.y[0])
+
     def per_row(self, value: Callable[[Material], float], gas: float) -> Floats:
         """What `value` says of the material of each row, (rows,); `gas` in rows without one."""
         by_layer = [gas if material is None else value(material) for material in self.materials]

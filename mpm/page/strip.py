@@ -85,7 +85,7 @@ class Drawing:
 def drawing(case: Case) -> Drawing:
     """Lay the strip out."""
     geometry = case.geometry
-    whole = sum(layer.height for layer in geometry.layers)
+    whole = geometry.height
     per_metre = WIDTH / geometry.length
     stretch = max(1, math.ceil(LOWEST / (whole * per_metre)))
     ports = _ports(case, per_metre)

@@ -80,7 +80,7 @@ def _strips(
 
 def _height(grid: Grid) -> float:
     """Of a strip with the names of its ports, title and label [inch]."""
-    return float((grid.y[-1] - grid.y[0]) / grid.length * WIDTH * stretch_of(grid)) + 1.2
+    return grid.height / grid.length * WIDTH * stretch_of(grid) + 1.2
 
 
 def same_grid(one: Grid, other: Grid) -> bool:

@@ -141,7 +141,7 @@ def map_figure(
 
 def stretch_of(grid: Grid) -> int:
     """By how much heights are stretched, so that the strip is at least 0.7 inch high."""
-    return max(1, int(np.ceil(0.7 / ((grid.y[-1] - grid.y[0]) / grid.length * WIDTH))))
+    return max(1, int(np.ceil(0.7 / (grid.height / grid.length * WIDTH))))
 
 
 def drawn_how(run: Run, stretch: int, streamlines: bool = False) -> str:
@@ -162,7 +162,7 @@ def draw_strip(
     mesh = draw_layer(axes, run, slice(0, grid.rows), values, entry, limits)
     axes.set_aspect(stretch)
     axes.set_facecolor("#f2f2f2")
-    draw_layers(axes, run.case, grid, (grid.y[-1] - grid.y[0]) / grid.length * WIDTH * stretch)
+    draw_layers(axes, run.case, grid, grid.height / grid.length * WIDTH * stretch)
     draw_ports(axes, run.case)
     axes.set_ylabel("y [mm]")
     return mesh

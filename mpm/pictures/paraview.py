@@ -149,7 +149,7 @@ def script(
     """The text of a script."""
     grid, motion = run.grid, run.case.motion
     times = [time for time, _ in series.steps]
-    high = vertical_scale(length=grid.length, height=float(grid.y[-1] - grid.y[0]), panels=len(panels))
+    high = vertical_scale(length=grid.length, height=grid.height, panels=len(panels))
     label = "'t = %.4g s' % time_value"
     if name == VIBRATION:
         phase = f"(time_value - {motion.start!r}) * {360.0 * motion.frequency!r} % 360.0"

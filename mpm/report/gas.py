@@ -58,7 +58,7 @@ def backflow(case: Case, totals: Totals, before: Totals | None) -> dict[str, flo
 def let_out(case: Case, totals: Totals, before: Totals | None, outlet: int) -> float | None:
     """Volume [m2] that has left through an outlet since `before`; None where it is below NO_FLOW of the strip: rounding of no flow."""
     volume = float(totals.out_volume[outlet] - (before.out_volume[outlet] if before else 0.0))
-    strip = case.geometry.length * sum(layer.height for layer in case.geometry.layers)
+    strip = case.geometry.length * case.geometry.height
     return volume if volume > NO_FLOW * strip else None
 
 
@@ -67,7 +67,7 @@ def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:
     if not case.mechanism.gas_reactions:
         return {}
     whole = float(state.cvd.sum())
-    area = grid.length * float(grid.y[-1] - grid.y[0])
+    area = grid.length * grid.height
     result: dict[str, Any] = {"rate_mean": whole / area, "rate_max": state.cvd_max}
     if whole > 0.0:
         result["share_in_zone"] = {

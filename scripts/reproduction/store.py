@@ -47,11 +47,10 @@ class Lab:
         """A case of `base` (zone or cycle) on a mesh, with changes by dotted key."""
         mesh = "coarse" if self.coarse else mesh
         case = load_case(BASES[base], {**MESHES[mesh], **(changes or {})})
-        cells = case.geometry.columns * sum(layer.cells for layer in case.geometry.layers)
         fidelity: str = case.fidelity
         if fidelity == "resolved" and case.motion.startup == "impulsive":
             fidelity = "start-up"
-        self.used.setdefault(f"{mesh}, {cells:,} cells", set()).add(fidelity)
+        self.used.setdefault(f"{mesh}, {case.geometry.cells:,} cells", set()).add(fidelity)
         return case
 
     def best(self, base: str, changes: Mapping[str, Any]) -> Case:

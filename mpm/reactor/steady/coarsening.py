@@ -20,7 +20,7 @@ THINNEST = 2  # rows that a layer keeps, if it has them
 def coarser(case: Case) -> Case | None:
     """`case` with columns twice as wide and half the rows in every layer; None where that would leave too few."""
     geometry = case.geometry
-    if geometry.columns * sum(layer.cells for layer in geometry.layers) < FEWEST:
+    if geometry.cells < FEWEST:
         return None
     changes: dict[str, object] = {"geometry.cell_width": f"{2.0 * geometry.length / geometry.columns!r} m"}
     for layer in geometry.layers:
