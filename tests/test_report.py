@@ -289,7 +289,7 @@ def test_points_of_a_sweep_open_their_runs(sweep: Path, browser: Any) -> None:
 def test_defaults_are_marked_and_warnings_are_there(zone: Path) -> None:
     """Fails when a value that nobody typed looks typed, or a warning of check is missing from the page."""
     page = run_page(zone, budget=0)
-    assert page.about == "averaged model, 2 s"
+    assert page.about == "averaged model, 1 s"
     origins = {one.key: one.origin for _, rows in page.inputs for one in rows}
     assert origins["geometry.inlet.tma.mass_fractions.TMA"] == "typed"
     assert (origins["geometry.periodic"], origins["motion.startup"]) == ("base", "default")
