@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import Strip
-from mpm.numerics.fem import PETSc
 from mpm.numerics.linear import COMPLETE, KrylovSolver
+from mpm.numerics.sparse import sparse_matrix
 from mpm.transport.fluxes import FluxOperator
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-STREAMS = 4
+STREAMS = 4  # pieces of a rank that a triangular solve goes through at once
 RECURRING = 1e-12  # residual of what complete factors solve
 
 
@@ -74,13 +72,8 @@ class CellMatrix:
         columns = (number[pattern.neighbours] * unknowns + each[:, None]).ravel()
         block_rows = (number[:own, None] * unknowns + i).ravel()
         block_columns = (number[:own, None] * unknowns + j).ravel()
-        self.matrix = PETSc.Mat().create(strip.comm)
-        self.matrix.setSizes(((own * unknowns, None), (own * unknowns, None)))
-        self.matrix.setType("aij")
-        self.matrix.setPreallocationCOO(
-            np.concatenate([rows, block_rows]).astype(PETSc.IntType),
-            np.concatenate([columns, block_columns]).astype(PETSc.IntType),
-        )
+        entries = np.concatenate([rows, block_rows]), np.concatenate([columns, block_columns])
+        self.matrix = sparse_matrix(strip.comm, own * unknowns, own * unknowns, entries)
         self._couplings = len(rows)
         self._values = np.zeros(len(rows) + own * unknowns * unknowns)
         self._diagonal = self.matrix.createVecLeft() if unknowns == 1 else None
@@ -110,10 +103,13 @@ class CellMatrix:
 
 
 class StepMatrix:
-    """gas_volume/dt + fluxes for one species, with the solvers that go with it; `fill` as in KrylovSolver."""
+    """gas_volume/dt + fluxes for species that diffuse alike, with the solvers that go with it; `fill` as in KrylovSolver.
 
-    def __init__(self, strip: Strip, name: str, fill: int = 0):
-        self.strip, self.name, self.fill = strip, name, fill
+    A solution leaves a sum of |residual| over all cells below `residual` [mol/m/s].
+    """
+
+    def __init__(self, strip: Strip, name: str, residual: float, fill: int = 0):
+        self.strip, self.name, self.residual, self.fill = strip, name, residual, fill
         self.cells = CellMatrix(strip, 1)
         self._holds: tuple[int, float] | None = None
         self._solvers: dict[bool, KrylovSolver] = {}  # by whether the matrix recurs
@@ -132,8 +128,8 @@ class StepMatrix:
         self.cells.matrix.mult(self._x, self._y)
         return np.array(self._y.array)
 
-    def solve(self, rhs: Floats, guess: Floats, residual: float, recurs: bool = False) -> Floats:
-        """BiCGStab from `guess` until the residual norm is below `residual` [mol/m/s]; collective. Raises ConvergenceError.
+    def solve(self, rhs: Floats, guess: Floats, recurs: bool = False) -> Floats:
+        """BiCGStab from own values `guess` to the solution, (own,); collective. Raises ConvergenceError.
 
         Where the matrix `recurs`, step after step, with complete factors of it that are kept (49,731 cells: 3 ms instead of 14).
         """
@@ -141,7 +137,7 @@ class StepMatrix:
         if solver is None:
             fill = COMPLETE if recurs else self.fill
             solver = self._solvers[recurs] = KrylovSolver(self.cells.matrix, self.name, 0.0, fill=fill)
-            least = residual / np.sqrt(max(self.cells.matrix.size[0], 1))
+            least = self.residual / np.sqrt(max(self.cells.matrix.size[0], 1))
             # complete factors solve as well on one rank, to rounding, as blocks of them must on several
             rtol, atol = (RECURRING, RECURRING * least) if recurs else (1e-13, least)
             solver.ksp.setTolerances(rtol=rtol, atol=atol)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.mesh.strip import Strip
 from mpm.parallel import Scatter
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from mpm.case.materials import Material
     from mpm.physics.kinetics import SurfaceKinetics
 
-Floats = NDArray[np.float64]
 TIE = 1e-6  # of a column: half a column, reached by rounding from either side, is always not yet enough
 MEMORY = 64  # columns remembered beyond each end; the bed swings back by a few at most
 

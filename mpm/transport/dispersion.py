@@ -17,8 +17,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.flow.cycle import periodic_flow
 from mpm.flow.fields import FlowField, face_flow, mean_field
 from mpm.flow.problem import FlowProblem
@@ -32,7 +32,6 @@ from mpm.transport.fluxes import FluxAssembler, cell_diffusivity
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Floats = NDArray[np.float64]
 NEGLIGIBLE = 1e-8  # share of the oscillation's energy below which a harmonic is left out
 LEAST = 0.1  # of D_eff: what a locally negative K leaves of it
 

@@ -15,8 +15,8 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.flow.fields import FaceFlow, inlet_share
 from mpm.mesh.strip import Strip
 from mpm.parallel import any_rank
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.ports import Inlet, Outlet
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 PURE_UPWIND = 1e-12  # of the velocity: a conductance below that changes the flux by less than rounding
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.parallel import is_root, total
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from mpm.transport.fluxes import FluxOperator
     from mpm.transport.ports import Ports
     from mpm.transport.reactions import Events, Reactions
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +47,11 @@ class Passed:
         )
 
 
+Entries = tuple[
+    Passed, Floats, Floats
+]  # of the ledger at one instant: what has passed, surface and gas events
+
+
 class Ledger:
     """The book of one rank: `passed` through its part of the ports, and events [mol/m] `surface` (reactions, reactive cells) and `gas`
     (reactions, own cells)."""
@@ -59,11 +62,11 @@ class Ledger:
         none = reactions.none()
         self.surface, self.gas = none.surface, none.gas
 
-    def memento(self) -> tuple[Passed, Floats, Floats]:
+    def memento(self) -> Entries:
         """The present entries, to go back to; cheap, because arrays are replaced and never changed in place."""
         return self.passed, self.surface, self.gas
 
-    def recall(self, memento: tuple[Passed, Floats, Floats]) -> None:
+    def recall(self, memento: Entries) -> None:
         """Go back to entries of this run."""
         self.passed, self.surface, self.gas = memento
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.mesh.strip import Strip
 from mpm.parallel import total
 from mpm.transport.fluxes import FluxOperator
@@ -15,8 +15,6 @@ from mpm.transport.fluxes import FluxOperator
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.ports import Inlet
-
-Floats = NDArray[np.float64]
 
 
 class Ports:
@@ -35,9 +33,7 @@ class Ports:
         )
         self.largest_feed = float(self.feed.max(initial=0.0))
         diffusivity = max((case.gas.diffusivity[name] for name in names), default=0.0)
-        diffusion = diffusivity / float(
-            strip.grid.y[-1] - strip.grid.y[0]
-        )  # brings in a feed without flow, over the strip's height
+        diffusion = diffusivity / strip.grid.height  # brings in a feed without flow, over the strip's height
         self.feed_rate = max(
             (
                 (inlet.velocity + diffusion) * inlet.width * float(fed.max(initial=0.0))

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import Strip
 from mpm.physics.kinetics import GasKinetics, SurfaceKinetics
 from mpm.physics.roles import Roles
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
     from mpm.case.case import Case
     from mpm.physics.mechanism import GasReaction, SurfaceReaction
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

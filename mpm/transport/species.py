@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.flow.fields import FlowField, face_flow
 from mpm.mesh.strip import Strip
@@ -23,16 +24,15 @@ from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.parallel import Scatter, largest, total
 from mpm.physics.roles import Roles
 from mpm.transport.cell_matrix import CellMatrix, StepMatrix, interleaved
-from mpm.transport.coverage import Coverage
+from mpm.transport.coverage import Coverage, Memento
 from mpm.transport.fluxes import FluxAssembler, FluxOperator, cell_diffusivity
-from mpm.transport.ledger import Ledger
+from mpm.transport.ledger import Entries, Ledger
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Events, Reactions
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-Floats = NDArray[np.float64]
 Operators = list[FluxOperator]  # of one velocity field, one per species
 NEWTON_LIMIT = 30
 # levels of fill-in of the incomplete factors, for reacting species and for products: with `resolved` every step has a matrix of its own
@@ -41,13 +41,11 @@ RESIDUAL = 1e-12  # sum of |residual| over all cells, relative to the largest fe
 # backward-error floor, relative to the sum of |diagonal C|: a residual below that is rounding, and accepted
 ROUNDING = float(np.finfo(float).eps)
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
+IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
-QUADRATIC = (
-    0.3  # inner tolerance over the residual: the next residual is about the square of this one in any case
-)
-LAST = (
-    1e-5 * RESIDUAL
-)  # what the inner tolerance aims at, and no further: traces far from their inlet are reported too
+QUADRATIC = 0.3  # inner tolerance over the residual, whose next value is about its square in any case
+# what the inner tolerance aims at, and no further: traces far from their inlet are reported too
+LAST = 1e-5 * RESIDUAL
 HALVINGS = 6
 BALANCED = 1e-4  # residual below which Newton's steps have no need of balanced cells
 NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
@@ -76,13 +74,13 @@ class Transport:
         self._group = [self.diffusivities.index(d) for d in diffusivities]
         self._at_rest = self._assemblers(np.zeros(len(self.diffusivities)))
         self._in_motion = self._at_rest
-        self.dispersion: Floats | None = None
         fill, product_fill = FILL[case.fidelity]
+        residual = self.ports.feed_rate * RESIDUAL
         self._linear = [
-            StepMatrix(strip, f"species with D = {d:g} m2/s", product_fill) for d in self.diffusivities
+            StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill)
+            for d in self.diffusivities
         ]
         self._newton = _Newton(strip, self.coupled, fill) if self.coupled else None
-        self.iterations = 0
 
     def _assemblers(self, dispersion: Floats) -> list[FluxAssembler]:
         """Those of the diffusivities in the pores, each with its `dispersion` added."""
@@ -94,7 +92,7 @@ class Transport:
     def disperse(self, dispersion: Floats) -> None:
         """Add `dispersion` (diffusivities, 2, local cells) [m2/s] to diffusion while the reactor vibrates, where the mean of the flow
         stands for its cycle."""
-        self.dispersion, self._in_motion = dispersion, self._assemblers(dispersion)
+        self._in_motion = self._assemblers(dispersion)
 
     def operators(self, flow: FlowField, at_rest: bool = False) -> Operators:
         """The operator of each species in a velocity field, that of a reactor `at_rest` or in motion; collective."""
@@ -171,7 +169,7 @@ class Transport:
                 raise
 
     def _recall(
-        self, concentration: Floats, earlier: Floats, last_step: float, coverage: Any, ledger: Any
+        self, concentration: Floats, earlier: Floats, last_step: float, coverage: Memento, ledger: Entries
     ) -> None:
         self.concentration, self.earlier, self.last_step = concentration, earlier, last_step
         self.coverage.recall(coverage)
@@ -194,7 +192,7 @@ class Transport:
             matrix = self._linear[self._group[i]]
             matrix.update(operators[i], dt)
             rhs = storage * old[i] + supply[i] + made[i - coupled]
-            new[i] = matrix.solve(rhs, old[i], self.ports.feed_rate * RESIDUAL, recurs)
+            new[i] = matrix.solve(rhs, old[i], recurs)
         self.concentration, self.earlier, self.last_step = new, old, dt
         self.ledger.book(self.ports, operators, new, dt, shares, drawn, events)
 
@@ -226,9 +224,7 @@ class Transport:
             blocks = -reactions.slopes(slopes, gas_slopes)
             for i in range(self.coupled):
                 blocks[:, i, i] += diagonal[i]
-            step, inner = newton.solve(blocks, residual, forcing(worst), refactor=iteration == 0)
-            self.iterations += inner
-            new = new - step
+            new = new - newton.solve(blocks, residual, forcing(worst), refactor=iteration == 0)
             if worst > BALANCED:
                 new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(
@@ -257,7 +253,7 @@ class Transport:
             rates = reactions.surface.part(active).rates(c, theta[:, active], dt)
             return reactions.on_surfaces(active, *rates)
 
-        idle = UNDERSHOOT * self.ports.feed_rate
+        idle = IDLE * self.ports.feed_rate
         start = np.maximum(new[:, cells], LOWEST)
         balanced = balance_locally(start, diagonal[:, cells], inflow, sources, idle, tries=3)
         return np.where(inflow > 0.0, balanced, 0.0)
@@ -277,14 +273,14 @@ class _Newton:
         """Enter the fluxes of the unknowns; returns what they add to the diagonal, (unknowns, own) [m2/s]."""
         return self.cells.set_fluxes(operators)
 
-    def solve(self, blocks: Floats, residual: Floats, tolerance: float, refactor: bool) -> tuple[Floats, int]:
-        """The step (unknowns, own) with `blocks` (own, unknowns, unknowns) on the diagonal, and how many iterations it took."""
+    def solve(self, blocks: Floats, residual: Floats, tolerance: float, refactor: bool) -> Floats:
+        """The step (unknowns, own) with `blocks` (own, unknowns, unknowns) on the diagonal; collective."""
         self.cells.assemble(blocks)
         self.rhs.array[:] = residual[:, self.order].T.ravel()
-        iterations = self.krylov.solve(self.rhs, self.step, tolerance, refactor=refactor)
+        self.krylov.solve(self.rhs, self.step, tolerance, refactor=refactor)
         step = np.empty_like(residual)
         step[:, self.order] = self.step.array.reshape(-1, self.unknowns).T
-        return step, iterations
+        return step
 
 
 def forcing(residual: float) -> float:

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpm.arrays import Floats
 from mpm.numerics.linear import DirectSolver
 from mpm.parallel import any_rank, total
 from mpm.transport.cell_matrix import CellMatrix
@@ -21,8 +21,6 @@ from mpm.transport.cell_matrix import CellMatrix
 if TYPE_CHECKING:
     from mpm.mesh.strip import Strip
     from mpm.transport.fluxes import FluxOperator, PortFlux
-
-Floats = NDArray[np.float64]
 
 
 def steady_fields(strip: Strip, operators: list[FluxOperator], supply: Floats) -> Floats:
