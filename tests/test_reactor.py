@@ -366,3 +366,12 @@ def test_flow_of_other_ranks_is_refused() -> None:
     if MPI.COMM_WORLD.size > 1:
         with pytest.raises(InputError, match="other ranks"):
             Reactor(case, MPI.COMM_SELF, flow=flow)
+
+
+@pytest.mark.parametrize("fidelity", ["averaged", "steady"])
+def test_a_reactor_runs_once(fidelity: str) -> None:
+    """Fails when a second run of a reactor goes on where the first one ended and reports balances and rates that count from there."""
+    reactor = Reactor(zone({**SHORT, "fidelity": fidelity}, TINY), MPI.COMM_SELF)
+    reactor.run()
+    with pytest.raises(InputError, match="has run"):
+        reactor.run()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mpm.arrays import Floats
+from mpm.errors import InputError
 from mpm.mesh.grid import Grid
 from mpm.output.history import Row, columns_of
 from mpm.reactor import records
@@ -57,10 +58,14 @@ class Reactor:
         `progress`: show how it gets on; by default where somebody watches, on a terminal or in a notebook.
 
         With `output`, everything the run writes goes there; `resume` continues from its restart state. Raises InputError (directory,
-        changed case), ConvergenceError, StorageError (full disk) and Interrupted; after the last three the directory is usable and can be
-        resumed.
+        changed case, a reactor that has run), ConvergenceError, StorageError (full disk) and Interrupted; after the last three the
+        directory is usable and can be resumed.
         """
         course = self.course
+        if course.rows:  # balances, rows and what passed since the last one count from the beginning of a run
+            raise InputError(
+                f"run: found a reactor that has run to t = {self.time:.6g} s; accepted: a new one, which may take its flow over"
+            )
         course.clock.begin()
         writer = Writer(course, output, self._identity)
         call_back = None if callback is None else lambda: callback(self)
