@@ -91,6 +91,7 @@ def _march(
     """
     phases, first = len(motions), not states
     convective_mean = problem.convective_force().duplicate()
+    convective_mean.set(0.0)
     state_mean = np.zeros_like(problem.values)
     change = speed = 0.0
     velocities = problem.space.velocities(problem.values)

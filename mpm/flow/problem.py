@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
 
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
-Ports = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
-CLOSED_PORTS: Ports = (0.0, 0.0)
+PortState = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
+CLOSED_PORTS: PortState = (0.0, 0.0)
 
 
 class FlowProblem:
@@ -243,7 +243,7 @@ class FlowProblem:
         """The present state as a velocity field, with the pressure of the step just made; a copy. Collective."""
         return FlowField(self.space.velocities(self.values), self.pressure())
 
-    def start_from(self, field: FlowField, ports: Ports) -> None:
+    def start_from(self, field: FlowField, ports: PortState) -> None:
         """Make `field`, whose `ports` these are, the present state."""
         self.values[:] = self.space.from_velocities(field.velocities)
         self._ports = ports

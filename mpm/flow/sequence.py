@@ -12,7 +12,7 @@ from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
 from mpm.flow.cycle import mean_motion, periodic_flow
 from mpm.flow.fields import FlowField, mean_field
-from mpm.flow.problem import CLOSED_PORTS, FlowProblem, Ports
+from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
 from mpm.flow.steady import steady_flow
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
@@ -127,7 +127,7 @@ class MarchedFlow:
     def _motion(self, step: Step) -> StepMotion:
         return step_motion(self.bed_motion, step.since, step.since + step.whole)
 
-    def _ports(self, steps: int) -> Ports:
+    def _ports(self, steps: int) -> PortState:
         """Those of the field after so many steps."""
         return (1.0, self._motion(self.schedule.step(steps - 1)).frame_velocity_y) if steps else CLOSED_PORTS
 
