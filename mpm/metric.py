@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from decimal import Decimal
+from decimal import Context, Decimal
 from functools import cache
 
 Dimensions = dict[str, int]
@@ -37,6 +37,9 @@ METRIC = {
 _FACTOR = r"[A-Za-z\u00b5]+(?:\^-?[1-9])?"
 _PRODUCT = re.compile(rf"(?:1/)?{_FACTOR}(?:/{_FACTOR})*|{_FACTOR}(?:[* ]{_FACTOR})*")
 ZERO_CELSIUS = Decimal("273.15")  # [K]
+UNBOUNDED = Context(
+    traps=[]
+)  # numbers of more digits in their power of ten than decimals have become infinite, as floats do
 
 
 def in_metric(number: str, symbol: str, unit: str) -> float | None:
@@ -44,11 +47,11 @@ def in_metric(number: str, symbol: str, unit: str) -> float | None:
     if (symbol, unit) == ("deg", "rad"):
         return math.radians(float(number))
     if (symbol, unit) == ("degC", "K"):
-        return float(Decimal(number) + ZERO_CELSIUS)
+        return float(UNBOUNDED.add(Decimal(number), ZERO_CELSIUS))
     given, wanted = _product(symbol), _product(unit)
     if given is None or wanted is None or given[1] != wanted[1]:
         return None
-    return float(Decimal(number).scaleb(given[0] - wanted[0]))
+    return float(Decimal(number).scaleb(given[0] - wanted[0], UNBOUNDED))
 
 
 def same_kind(symbol: str, unit: str) -> bool | None:

@@ -11,14 +11,14 @@ import logging
 import math
 import re
 from dataclasses import KW_ONLY, dataclass
-from decimal import Decimal
+from decimal import Decimal, localcontext
 from functools import cache, lru_cache
 from typing import Annotated, Any
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from mpm.metric import in_metric, same_kind
+from mpm.metric import UNBOUNDED, in_metric, same_kind
 from mpm.spelling import advice
 
 _NUMBER = re.compile(
@@ -80,7 +80,8 @@ def parse(text: str, unit: str) -> float:
         return float(number)
     if given == registry.degree:
         return math.radians(float(number))  # the float next to the true value; decimals of pi would miss it
-    return float(registry.Quantity(Decimal(number), given).to(wanted).magnitude)
+    with localcontext(UNBOUNDED):
+        return float(registry.Quantity(Decimal(number), given).to(wanted).magnitude)
 
 
 def is_counted(text: str, unit: str) -> bool:

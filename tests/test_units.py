@@ -55,6 +55,9 @@ FRACTION = Dimension("", "a fraction", "0.46", above=0.0, below=1.0)
         ("3 \u03bcm", "m", 3e-6),  # Greek mu
         ("58000 m⁻¹", "1/m", 58000.0),
         ("1.72e-5 Pa·s", "Pa*s", 1.72e-5),
+        ("1e999999999999999999 cm", "m", math.inf),  # beyond the exponents of decimals, metric or not
+        ("1e9999999 ft", "m", math.inf),
+        ("-1e9999999 degC", "K", -math.inf),
         ("−0.40\u202fcm/s", "m/s", -0.004),  # minus sign, narrow space that does not break
     ],
 )
