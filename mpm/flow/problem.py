@@ -36,13 +36,14 @@ from mpm.flow.terms import Medium, bed_entrainment, drag, frame_acceleration, in
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import StepMotion
 from mpm.numerics.fem import PETSc, dolfinx
-from mpm.numerics.linear import DirectSolver, check
+from mpm.numerics.linear import ITERATIONS, DirectSolver, check
 from mpm.numerics.sparse import sparse_matrix
 from mpm.parallel import largest
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
+STEADY = float("inf")  # s, the time step without inertia
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
 PortState = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
 CLOSED_PORTS: PortState = (0.0, 0.0)
@@ -51,9 +52,8 @@ CLOSED_PORTS: PortState = (0.0, 0.0)
 class FlowProblem:
     """Assembled flow operators of a case; advances or balances the fluxes u, its state.
 
-    One factor belongs to the time step `dt` [s] (backward Euler), one to the steady operator; each is made when first needed. Steps of a
-    `refined` problem are the same to 1e-12 at every run on as many ranks. `unbalanced` (own fluxes) is the force that the pressure must
-    balance.
+    A factor belongs to each time step [s], `dt` of backward Euler or STEADY, made when first needed. Steps of a `refined` problem are the
+    same to 1e-12 at every run on as many ranks. `unbalanced` (own fluxes) is the force that the pressure must balance.
     """
 
     def __init__(self, case: Case, strip: Strip, dt: float, refined: bool = False):
@@ -61,7 +61,8 @@ class FlowProblem:
         self.space = FlowSpace(case, strip)
         self.state = self.space.function()
         self.convection_share = 1.0  # below 1 on the way to a fast flow
-        self._solvers: dict[str, DirectSolver] = {}
+        self._matrices: dict[float, PETSc.Mat] = {}  # A + M/dt and the factors of its curls, by dt
+        self._solvers: dict[float, DirectSolver] = {}
         self._assemble()
         self._ports = CLOSED_PORTS  # of the state
         self._port_fields = self.space.ports()
@@ -74,9 +75,7 @@ class FlowProblem:
         closed = ufl.Measure("ds", domain=self.strip.mesh, subdomain_data=self.space.facets)(CLOSED)
         self.viscous = _matrix(viscosity(u, v, m, closed) + drag(u, v, m))
         self.mass = _matrix(inertia(u, v, m))
-        step = self.viscous.copy()
-        step.axpy(1.0 / self.dt, self.mass, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        self._matrices = {"steady": self.viscous, "step": step}
+        self._matrices[STEADY] = self.viscous
         solids = self.space.along_x(m.moving_solid)  # their volume flux per unit velocity of the bed
         self.entrainment = _vector(bed_entrainment(solids, v, m, closed))
         self.acceleration = _vector(frame_acceleration(v, m))
@@ -86,16 +85,25 @@ class FlowProblem:
 
     def release(self) -> None:
         """Give the factors' memory back; they are made anew when needed again. Collective."""
+        for dt in [dt for dt in self._matrices if dt != STEADY]:
+            self._matrices.pop(dt).destroy()
         for solver in self._solvers.values():
             solver.destroy()
         self._solvers.clear()
 
-    def _solver(self, kind: str) -> DirectSolver:
-        """The factor of Z^T A Z, for a "step" of Z^T (A + M/dt) Z."""
-        if kind not in self._solvers:
-            reduced = self._matrices[kind].ptap(self.space.curl)
-            self._solvers[kind] = DirectSolver(reduced, f"flow ({kind})", definite=True)
-        return self._solvers[kind]
+    def operator(self, dt: float) -> PETSc.Mat:
+        """A + M/dt."""
+        if dt not in self._matrices:
+            matrix = self._matrices[dt] = self.viscous.copy()
+            matrix.axpy(1.0 / dt, self.mass, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        return self._matrices[dt]
+
+    def _solver(self, dt: float) -> DirectSolver:
+        """The factor of Z^T (A + M/dt) Z."""
+        if dt not in self._solvers:
+            reduced = self.operator(dt).ptap(self.space.curl)
+            self._solvers[dt] = DirectSolver(reduced, f"flow (step of {dt:.3g} s)", definite=True)
+        return self._solvers[dt]
 
     # --- solving ---
 
@@ -113,13 +121,13 @@ class FlowProblem:
         if moved is not None:
             self._work.array[:] = moved[: self.space.own] / self.dt
             self.mass.multAdd(self._work, self.unbalanced, self.unbalanced)
-        self._balance("step")
+        self._balance(self.dt)
 
     def solve_steady(self, motion: StepMotion, convective: PETSc.Vec) -> None:
         """Set the state to the steady solution under `motion` with a given convective force."""
         self._move_ports(motion)
         self.weigh(motion, convective)
-        self._balance("steady", passes=2)
+        self._balance(STEADY, passes=2)
 
     def _move_ports(self, motion: StepMotion) -> Floats | None:
         """Give the state the port flows of a step; returns its change (local fluxes,), None without any."""
@@ -136,7 +144,7 @@ class FlowProblem:
         """The flow with the same ports as the fluxes `values`, but without inertia and forces."""
         self.values[:] = values
         self.viscous.mult(self.state.x.petsc_vec, self.unbalanced)
-        self._balance("steady", passes=2)
+        self._balance(STEADY, passes=2)
         found = self.values.copy()
         self.values[:] = 0.0
         return found
@@ -153,16 +161,15 @@ class FlowProblem:
         force = self.convective_force() if convective is None else convective
         residual.array[:] += force.array[: self.space.own]
 
-    def _balance(self, kind: str, passes: int = 1) -> None:
+    def _balance(self, dt: float, passes: int = 1) -> None:
         """Change the state so that `unbalanced` has no curl; it is kept up to date."""
         if self._psi.size == 0:
             return  # walls all around a cell
-        solver = self._solver(kind)
         for _ in range(passes + self.refined):
             self.space.curl.multTranspose(self.unbalanced, self._rhs)
-            solver.solve(self._rhs, self._psi)
+            self._solver(dt).solve(self._rhs, self._psi)
             self._adopt()
-            self._matrices[kind].multAdd(self._work, self.unbalanced, self.unbalanced)
+            self.operator(dt).multAdd(self._work, self.unbalanced, self.unbalanced)
 
     def _adopt(self) -> None:
         """Subtract the curl of `_psi` from the state; leaves the change in `_work`."""
@@ -192,7 +199,7 @@ class FlowProblem:
             solver.solve(self._rhs, self._psi)
             solver.destroy()
         else:
-            self._iterate(tolerance)
+            self._iterate(STEADY, tolerance)
         self._adopt()
         change = self.space.fastest(self._work.array)
         change, fastest = largest(self.strip.comm, [change, self.space.fastest(self.values)])
@@ -206,22 +213,36 @@ class FlowProblem:
         whole.axpy(1.0, self.viscous)
         return whole.ptap(self.space.curl)
 
-    def _iterate(self, tolerance: float) -> None:
-        """Solve Z^T (A + dN/du) Z psi = rhs by GMRES, on the right preconditioned with the factor of Z^T A Z."""
-        steady = self._solver("steady")
-        jacobian = PETSc.Mat().createPython(steady.matrix.getSizes(), _Jacobian(self), self.strip.comm)
+    def decayed(self, change: Floats, time: float, tolerance: float) -> Floats:
+        """What is left of a `change` of the flow (local fluxes,), ports closed, after an implicit step of `time` [s]; collective.
+
+        Z^T (A + dN/du + M/time) Z psi = Z^T M change/time, to the `tolerance`. Raises ConvergenceError.
+        """
+        left = self.space.function()
+        if self._psi.size:
+            self._work.array[:] = change[: self.space.own] / time
+            self.mass.mult(self._work, left.x.petsc_vec)
+            self.space.curl.multTranspose(left.x.petsc_vec, self._rhs)
+            self._iterate(time, tolerance)
+            self.space.curl.mult(self._psi, left.x.petsc_vec)
+            left.x.scatter_forward()
+        return np.array(left.x.array)
+
+    def _iterate(self, dt: float, tolerance: float) -> None:
+        """Solve Z^T (A + dN/du + M/dt) Z psi = rhs by GMRES, on the right preconditioned with the factor of Z^T (A + M/dt) Z."""
+        creeping = self._solver(dt)
+        jacobian = PETSc.Mat().createPython(creeping.matrix.getSizes(), _Jacobian(self, dt), self.strip.comm)
         ksp = PETSc.KSP().create(self.strip.comm)
         ksp.setType("gmres")
         ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=200)
-        ksp.setPC(steady.ksp.getPC())
-        ksp.setOperators(jacobian, steady.matrix)
-        ksp.setGMRESRestart(30)
+        ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=ITERATIONS)
+        ksp.setPC(creeping.ksp.getPC())
+        ksp.setOperators(jacobian, creeping.matrix)
         try:
             ksp.solve(self._rhs, self._psi)
             check(ksp, "flow (Newton)")
         finally:
-            steady.ksp.setOperators(steady.matrix)
+            creeping.ksp.setOperators(creeping.matrix)
             ksp.destroy()
             jacobian.destroy()
 
@@ -250,10 +271,10 @@ class FlowProblem:
 
 
 class _Jacobian:
-    """Z^T (A + dN/du) Z at the state of a problem, as PETSc asks for its product with a vector."""
+    """Z^T (A + dN/du + M/dt) Z at the state of a problem, as PETSc asks for its product with a vector."""
 
-    def __init__(self, problem: FlowProblem):
-        self.problem, self._change = problem, problem.space.function()
+    def __init__(self, problem: FlowProblem, dt: float):
+        self.problem, self._change, self._creeping = problem, problem.space.function(), problem.operator(dt)
 
     def mult(self, _: PETSc.Mat, psi: PETSc.Vec, result: PETSc.Vec) -> None:
         """result = J psi."""
@@ -261,7 +282,7 @@ class _Jacobian:
         curl, work = problem.space.curl, problem._work
         curl.mult(psi, change.x.petsc_vec)
         change.x.scatter_forward()
-        problem.viscous.mult(change.x.petsc_vec, work)
+        self._creeping.mult(change.x.petsc_vec, work)
         slope = problem.convection.slope(problem.values, change.x.array)
         work.array[:] += problem.convection_share * slope.array[: problem.space.own]
         curl.multTranspose(work, result)
