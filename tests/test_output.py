@@ -19,7 +19,7 @@ from mpm.errors import ConvergenceError, InputError, MpmError
 from mpm.files import write_atomically
 from mpm.mesh.grid import Grid
 from mpm.output.directory import RunDirectory
-from mpm.output.vtu import read_pvd, read_vtu
+from mpm.output.vtu import Packer, read_pvd, read_vtu
 
 COLUMNS, ROWS = 12, 5
 
@@ -127,6 +127,15 @@ def test_own_reader_returns_what_was_written(run: RunDirectory, grid: Grid) -> N
     stored = single.read_fields().cell_data["C_TMA"]
     assert stored.dtype == np.float32
     assert np.allclose(stored, fields(grid, 1.0)["C_TMA"], rtol=6e-8, atol=0)
+
+
+def test_what_changes_under_a_known_name_is_written_anew() -> None:
+    """Fails when one packer for many times writes an old array of the same name, or compresses again what has stayed the same."""
+    packer = Packer()
+    first = packer.block("C_TMA", b"one" * 100)
+    assert packer.block("C_TMA", b"one" * 100) is first
+    assert packer.block("C_TMA", b"two" * 100) != first
+    assert packer.block("C_TMA", b"one" * 100) == first
 
 
 def test_wrong_shape_is_refused(run: RunDirectory, grid: Grid) -> None:

@@ -11,7 +11,8 @@ Tested with the functions v of the Raviart-Thomas elements of lowest order, with
     faces inside       (u.n) (w_ahead - w_behind) . {c v}            tangential parts, {} the mean of both sides
     walls, where u.n points inwards                 (c/eps) |u.n| u.v
 
-of one linear function of the fluxes with another one: N(u) = T (S u * D u), with three sparse matrices that are made once.
+of one linear function of the fluxes with another one: N(u) = T (S u * D u), with three sparse matrices that are made once. Products come
+in pairs, one for each of the two functions v along the same pair of sides, with the same S u.
 """
 
 from __future__ import annotations
@@ -23,9 +24,7 @@ import numpy as np
 from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP
 from mpm.numerics.fem import PETSc, dolfinx
-from mpm.numerics.sparse import sparse_matrix
-
-from mpi4py import MPI  # isort: skip  (after fem)
+from mpm.numerics.sparse import local_matrix
 
 if TYPE_CHECKING:
     from mpm.flow.space import FlowSpace
@@ -44,15 +43,15 @@ class Convection:
 
     def __init__(self, space: FlowSpace, density: float):
         self.space = space
-        self._products = _Products(space, density)
+        self._products = terms = _Products(space, density)
         local = len(space.weights)
-        terms = self._products
-        self._carrier = _matrix(terms.count, local, *terms.carriers())
-        self._carried = _matrix(terms.count, local, *terms.carried())
-        self._tests = _matrix(local, terms.count, *terms.tests())
+        self._carrier = local_matrix(terms.count // 2, local, *terms.carriers())
+        self._carried = local_matrix(terms.count, local, *terms.carried())
+        self._tests = local_matrix(local, terms.count, *terms.tests())
         self._inward = terms.walls
-        self._field, self._sum = self._carrier.createVecs()[0], self._tests.createVecs()[1]
-        self._one, self._other, self._product = (self._tests.createVecRight() for _ in range(3))
+        self._field, self._one = self._carrier.createVecs()
+        self._other = self._carried.createVecLeft()
+        self._product, self._sum = self._tests.createVecs()
         self._force = dolfinx.la.vector(space.fluxes.dofmap.index_map, 1)
 
     def force(self, values: Floats) -> PETSc.Vec:
@@ -72,18 +71,22 @@ class Convection:
         one, other = self._factors(values)
         numbers = self.space.fluxes.dofmap.index_map.local_to_global(np.arange(len(values), dtype=np.int32))
         carrier, carried, tests = self._products.carriers(), self._products.carried(), self._products.tests()
-        one_slope = np.ones(self._products.count)
+        one_slope = np.ones_like(one)
         one_slope[self._inward] = one[self._inward] > 0.0
         rows, columns, entries = [], [], []
-        for (product, dof, share), factor in ((carrier, other * one_slope), (carried, one)):
-            starts = np.searchsorted(product, tests[1])
-            ends = np.searchsorted(product, tests[1], side="right")
+        product = tests[1]
+        for (known, dof, share), row, factor in (
+            (carrier, product // 2, (other * one_slope).ravel()),
+            (carried, product, np.repeat(one, 2)),
+        ):
+            starts = np.searchsorted(known, row)
+            ends = np.searchsorted(known, row, side="right")
             for k in range(int((ends - starts).max(initial=0))):
                 chosen = starts + k < ends
                 at = starts[chosen] + k
                 rows.append(numbers[tests[0][chosen]])
                 columns.append(numbers[dof[at]])
-                entries.append(tests[2][chosen] * share[at] * factor[product[at]])
+                entries.append(tests[2][chosen] * share[at] * factor[product[chosen]])
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(entries)
 
     def _factors(self, values: Floats) -> tuple[Floats, Floats]:
@@ -92,17 +95,20 @@ class Convection:
         return one, self._carried_of(values)
 
     def _carrier_of(self, values: Floats) -> Floats:
+        """S u, one value per pair of products (pairs, 1)."""
         self._field.array[:] = values
         self._carrier.mult(self._field, self._one)
-        return np.array(self._one.array)
+        return np.array(self._one.array)[:, None]
 
     def _carried_of(self, values: Floats) -> Floats:
+        """D u (pairs, 2)."""
         self._field.array[:] = values
         self._carried.mult(self._field, self._other)
-        return np.array(self._other.array)
+        return np.array(self._other.array).reshape(-1, 2)
 
     def _add_up(self, products: Floats) -> PETSc.Vec:
-        self._product.array[:] = products
+        """T times the products (pairs, 2), what neighbours know included."""
+        self._product.array[:] = products.ravel()
         self._tests.mult(self._product, self._sum)
         self._force.array[:] = self._sum.array
         self._force.scatter_reverse(dolfinx.la.InsertMode.add)
@@ -112,7 +118,8 @@ class Convection:
 class _Products:
     """The products of N, two for each pair of sides along which something is carried, as entries (row, column, value) of S, D and T.
 
-    The `count` products come pair by pair: 4 of every own cell, 2 of every own face inside, 2 of every own wall. `walls` are the last.
+    The `count` products come pair by pair: 4 of every own cell, 2 of every own face inside, 2 of every own wall. `walls` are the last
+    pairs.
     """
 
     def __init__(self, space: FlowSpace, density: float):
@@ -141,29 +148,27 @@ class _Products:
         self._walls = [(bottom, BOTTOM, 1.0), (top, TOP, -1.0)]
         inside = 4 * own + 2 * len(mine)
         self.count = inside + 2 * (len(bottom) + len(top))
-        self.walls = slice(inside, self.count)
+        self.walls = slice(inside // 2, self.count // 2)
 
     def carriers(self) -> tuple[Ints, Ints, Floats]:
-        """S: what carries. In cells the difference of the two velocities, elsewhere the velocity through the face (inwards at walls)."""
-        entries = _Entries(self.space)
+        """S, one row per pair: what carries. In cells the difference of the two velocities, elsewhere the velocity through the face
+        (inwards at walls)."""
+        entries = _Entries(self.space, 1)
         for cells, sides, _ in self._cells:
-            for pair in (0, 1):
-                entries.add(cells, self.space.dofs[cells, sides[0]], -1.0, pair)
-                entries.add(cells, self.space.dofs[cells, sides[1]], 1.0, pair)
+            entries.add(cells, self.space.dofs[cells, sides[0]], -1.0)
+            entries.add(cells, self.space.dofs[cells, sides[1]], 1.0)
             entries.next(len(cells))
         for behind, _, _, _, normal in self._faces:
-            for pair in (0, 1):
-                entries.add(np.arange(len(behind)), normal, 1.0, pair)
+            entries.add(np.arange(len(behind)), normal, 1.0)
             entries.next(len(behind))
         for cells, side, sign in self._walls:
-            for pair in (0, 1):
-                entries.add(np.arange(len(cells)), self.space.dofs[cells, side], sign, pair)
+            entries.add(np.arange(len(cells)), self.space.dofs[cells, side], sign)
             entries.next(len(cells))
         return entries.sorted()
 
     def carried(self) -> tuple[Ints, Ints, Floats]:
         """D: what is carried, tested with either of the two functions: the velocity in cells and at walls, the jump of w at faces."""
-        entries, dofs = _Entries(self.space), self.space.dofs
+        entries, dofs = _Entries(self.space, 2), self.space.dofs
         for cells, sides, _ in self._cells:
             for pair in (0, 1):
                 for k in (0, 1):
@@ -186,7 +191,7 @@ class _Products:
 
     def tests(self) -> tuple[Ints, Ints, Floats]:
         """T: which fluxes a product acts on, times what is the same for both; rows are fluxes here, columns products, sorted by product."""
-        entries, dofs, width = _Entries(self.space), self.space.dofs, self.space.strip.grid.dx
+        entries, dofs, width = _Entries(self.space, 2), self.space.dofs, self.space.strip.grid.dx
         for cells, sides, across in self._cells:
             for pair in (0, 1):
                 entries.add(cells, dofs[cells, sides[pair]], (self._c / self._eps)[cells] * across, pair)
@@ -207,33 +212,26 @@ class _Products:
 
 
 class _Entries:
-    """Entries of a matrix that reads or tests velocities, product by product; a flux is its velocity times a weight."""
+    """Entries of a matrix that reads or tests velocities, in `each` (1, 2) rows for every place; a flux is its velocity times a weight."""
 
-    def __init__(self, space: FlowSpace):
-        self.space, self.first = space, 0
+    def __init__(self, space: FlowSpace, each: int):
+        self.space, self.each, self.first = space, each, 0
         self.products: list[Ints] = []
         self.fluxes: list[Ints] = []
         self.values: list[Floats] = []
 
-    def add(self, place: Ints, fluxes: Ints, values: Floats | float, pair: int) -> None:
-        """The product `pair` (0, 1) of each `place` of this kind."""
-        self.products.append(self.first + 2 * place + pair)
+    def add(self, place: Ints, fluxes: Ints, values: Floats | float, which: int = 0) -> None:
+        """In row number `which` of each `place` of this kind."""
+        self.products.append(self.first + self.each * place + which)
         self.fluxes.append(fluxes)
         self.values.append(values / self.space.weights[fluxes])
 
     def next(self, places: int) -> None:
         """Go on to the next kind, after one of so many places."""
-        self.first += 2 * places
+        self.first += self.each * places
 
     def sorted(self) -> tuple[Ints, Ints, Floats]:
         """Product, flux and value of every entry, by product."""
         products = np.concatenate(self.products)
         order = np.argsort(products, kind="stable")
         return products[order], np.concatenate(self.fluxes)[order], np.concatenate(self.values)[order]
-
-
-def _matrix(rows: int, columns: int, row: Ints, column: Ints, values: Floats) -> PETSc.Mat:
-    """A sparse matrix of this rank alone."""
-    matrix = sparse_matrix(MPI.COMM_SELF, rows, columns, (row, column))
-    matrix.setValuesCOO(values)
-    return matrix

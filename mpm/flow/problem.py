@@ -22,6 +22,7 @@ relative to that. The terms of the equation are the functions of `mpm.flow.terms
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,13 +32,15 @@ from ufl import Form
 from mpm.arrays import Floats
 from mpm.flow.convection import Convection
 from mpm.flow.fields import FlowField
+from mpm.flow.linearised import Jacobian
 from mpm.flow.space import CLOSED, FlowSpace
 from mpm.flow.terms import Medium, bed_entrainment, drag, frame_acceleration, inertia, viscosity
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import StepMotion
 from mpm.numerics.fem import PETSc, dolfinx
-from mpm.numerics.linear import ITERATIONS, DirectSolver, check
-from mpm.numerics.sparse import sparse_matrix
+from mpm.numerics.linear import DirectSolver
+from mpm.numerics.memory import give_back
+from mpm.numerics.sparse import sparse_matrix, thinned
 from mpm.parallel import largest
 
 if TYPE_CHECKING:
@@ -73,8 +76,7 @@ class FlowProblem:
         u, v = ufl.TrialFunction(self.space.fluxes), ufl.TestFunction(self.space.fluxes)
         m = Medium.from_case(self.case, self.strip)
         closed = ufl.Measure("ds", domain=self.strip.mesh, subdomain_data=self.space.facets)(CLOSED)
-        self.viscous = _matrix(viscosity(u, v, m, closed) + drag(u, v, m))
-        self.mass = _matrix(inertia(u, v, m))
+        self.viscous = thinned(_matrix(viscosity(u, v, m, closed) + drag(u, v, m)))
         self._matrices[STEADY] = self.viscous
         solids = self.space.along_x(m.moving_solid)  # their volume flux per unit velocity of the bed
         self.entrainment = _vector(bed_entrainment(solids, v, m, closed))
@@ -82,6 +84,13 @@ class FlowProblem:
         self.convection = Convection(self.space, m.density)
         self.unbalanced, self._work = (self.viscous.createVecLeft() for _ in range(2))
         self._psi, self._rhs = (self.space.curl.createVecRight() for _ in range(2))
+        give_back(self.strip.comm)  # what forms take while they are assembled is as much as a factor
+
+    @cached_property
+    def mass(self) -> PETSc.Mat:
+        """M; a steady flow has no use for it."""
+        u, v = ufl.TrialFunction(self.space.fluxes), ufl.TestFunction(self.space.fluxes)
+        return thinned(_matrix(inertia(u, v, Medium.from_case(self.case, self.strip))))
 
     def release(self) -> None:
         """Give the factors' memory back; they are made anew when needed again. Collective."""
@@ -95,7 +104,7 @@ class FlowProblem:
         """A + M/dt."""
         if dt not in self._matrices:
             matrix = self._matrices[dt] = self.viscous.copy()
-            matrix.axpy(1.0 / dt, self.mass, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            matrix.axpy(1.0 / dt, self.mass)
         return self._matrices[dt]
 
     def _solver(self, dt: float) -> DirectSolver:
@@ -229,22 +238,11 @@ class FlowProblem:
         return np.array(left.x.array)
 
     def _iterate(self, dt: float, tolerance: float) -> None:
-        """Solve Z^T (A + dN/du + M/dt) Z psi = rhs by GMRES, on the right preconditioned with the factor of Z^T (A + M/dt) Z."""
-        creeping = self._solver(dt)
-        jacobian = PETSc.Mat().createPython(creeping.matrix.getSizes(), _Jacobian(self, dt), self.strip.comm)
-        ksp = PETSc.KSP().create(self.strip.comm)
-        ksp.setType("gmres")
-        ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        ksp.setTolerances(rtol=tolerance, atol=0.0, max_it=ITERATIONS)
-        ksp.setPC(creeping.ksp.getPC())
-        ksp.setOperators(jacobian, creeping.matrix)
-        try:
-            ksp.solve(self._rhs, self._psi)
-            check(ksp, "flow (Newton)")
-        finally:
-            creeping.ksp.setOperators(creeping.matrix)
-            ksp.destroy()
-            jacobian.destroy()
+        """Solve Z^T (A + dN/du + M/dt) Z psi = rhs to the `tolerance`, with the factor of Z^T (A + M/dt) Z as preconditioner."""
+        jacobian = Jacobian(
+            self.space, self.operator(dt), self.convection, self.values, self.convection_share
+        )
+        jacobian.solve(self._solver(dt), self._rhs, self._psi, tolerance)
 
     # --- looking at the state ---
 
@@ -268,24 +266,6 @@ class FlowProblem:
         """Make `field`, whose `ports` these are, the present state."""
         self.values[:] = self.space.from_velocities(field.velocities)
         self._ports = ports
-
-
-class _Jacobian:
-    """Z^T (A + dN/du + M/dt) Z at the state of a problem, as PETSc asks for its product with a vector."""
-
-    def __init__(self, problem: FlowProblem, dt: float):
-        self.problem, self._change, self._creeping = problem, problem.space.function(), problem.operator(dt)
-
-    def mult(self, _: PETSc.Mat, psi: PETSc.Vec, result: PETSc.Vec) -> None:
-        """result = J psi."""
-        problem, change = self.problem, self._change
-        curl, work = problem.space.curl, problem._work
-        curl.mult(psi, change.x.petsc_vec)
-        change.x.scatter_forward()
-        self._creeping.mult(change.x.petsc_vec, work)
-        slope = problem.convection.slope(problem.values, change.x.array)
-        work.array[:] += problem.convection_share * slope.array[: problem.space.own]
-        curl.multTranspose(work, result)
 
 
 def _matrix(form: Form) -> PETSc.Mat:

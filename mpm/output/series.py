@@ -23,6 +23,7 @@ class Series:
     def __init__(self, directory: Path, name: str, precision: str):
         self.directory, self.name, self.precision = directory, name, precision
         self._steps: list[tuple[float, str]] | None = None
+        self._packer = vtu.Packer()
 
     @property
     def pvd(self) -> Path:
@@ -60,7 +61,12 @@ class Series:
             check_finite(values, f"{name}: {key}")
         points = vtu.grid_points(grid.x, grid.y, displacement)
         content = vtu.encode_vtu(
-            points, vtu.grid_quads(grid.columns, grid.rows), data, float(time), self.precision
+            points,
+            vtu.grid_quads(grid.columns, grid.rows),
+            data,
+            float(time),
+            self.precision,
+            self._packer,
         )
         (self.directory / self.name).mkdir(exist_ok=True)
         write_atomically(self.directory / name, content)

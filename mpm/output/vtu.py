@@ -7,6 +7,7 @@ Format: VTK User's Guide, "XML file formats".
 
 from __future__ import annotations
 
+import hashlib
 import re
 import struct
 import xml.etree.ElementTree as ElementTree
@@ -64,18 +65,20 @@ def encode_vtu(
     cell_data: Mapping[str, ArrayLike],
     time: float,
     precision: str = "Float32",
+    packer: Packer | None = None,
 ) -> bytes:
-    """The bytes of a `.vtu` file.
+    """The bytes of a `.vtu` file; one `packer` for many times compresses what stays the same only once.
 
     `cell_data` holds arrays of shape (cells,), or (cells, 2) and (cells, 3) for vectors (padded to three components);
     integers are stored as Int32, real numbers in `precision` (Float32 or Float64), coordinates always as Float64.
     """
+    packer = packer or Packer()
     blocks: list[bytes] = []
     offset = 0
 
     def array(name: str, values: NDArray[np.generic]) -> str:
         nonlocal offset
-        block = compressed_block(np.ascontiguousarray(values).tobytes())
+        block = packer.block(name, np.ascontiguousarray(values).tobytes())
         components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim == 2 else ""
         kind = VTK_TYPE[values.dtype.name]
         line = f'<DataArray type="{kind}" Name={xml_attribute(name)}{components} format="appended" offset="{offset}"/>\n'
@@ -116,10 +119,19 @@ def cell_array(name: str, values: ArrayLike, cells: int, real: np.dtype[np.gener
     return found
 
 
-def compressed_block(raw: bytes) -> bytes:
-    """vtkZLibDataCompressor's layout with a single block: [blocks, block size, last partial size, compressed size] + data."""
-    packed = zlib.compress(raw, 1)
-    return struct.pack("<4Q", 1, len(raw), 0, len(packed)) + packed
+class Packer:
+    """Compresses arrays and remembers the last block of each name: mesh and mean flow are the same from time to time."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, tuple[bytes, bytes]] = {}  # digest of the raw bytes, block
+
+    def block(self, name: str, raw: bytes) -> bytes:
+        """vtkZLibDataCompressor's layout with a single block: [blocks, block size, last partial size, compressed size] + data."""
+        digest = hashlib.blake2b(raw, digest_size=16).digest()
+        if name not in self._last or self._last[name][0] != digest:
+            packed = zlib.compress(raw, 1)
+            self._last[name] = digest, struct.pack("<4Q", 1, len(raw), 0, len(packed)) + packed
+        return self._last[name][1]
 
 
 def read_vtu(path: str | Path) -> Snapshot:

@@ -11,6 +11,7 @@ from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
 from mpm.numerics import fem
+from mpm.numerics.memory import give_back
 from mpm.parallel import on_root, total
 from mpm.reactor.flow import Flow, conditions, dispersed, dispersion_conditions, find_flow, taken_over
 from mpm.transport.coverage import Coverage
@@ -77,6 +78,7 @@ class System:
             known = taken_over(known, case, strip, self.schedule)
         flow = dispersed(known, case, strip, motion, self.transport.diffusivities, watch)
         self._use(flow)
+        give_back(self.comm)
         return flow
 
     def _use(self, flow: Flow, steps: int = 0) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.numerics.linear import DirectSolver
+from mpm.numerics.memory import give_back
 from mpm.parallel import any_rank, largest
 from mpm.reactor.steady.cellwise import balanced
 from mpm.reactor.steady.coarsening import coarser, prolonged
@@ -172,6 +173,8 @@ class SteadySolver:
         except ConvergenceError:
             return  # a first guess is not worth an error
         self.state = self.old = prolonged(coarse.equations, coarse.state, self.equations)
+        del coarse
+        give_back(self.equations.strip.comm)
         self._carry(self.state.concentration, self.state.theta, self.equations.last_step)
 
     def _failure(self, step: float) -> ConvergenceError:
