@@ -37,7 +37,7 @@ BEFORE = (
     "surface",
     "slid",
 )  # of the latest output, for what is reported since then
-FORMAT = 4  # of the states that this version writes and reads; another number for every change of what an entry means
+FORMAT = 5  # of the states that this version writes and reads; another number for every change of what an entry means
 
 
 def identity(case: Case) -> Identity:

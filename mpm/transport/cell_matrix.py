@@ -20,24 +20,18 @@ class FacePattern:
     """Which own cell is coupled to which neighbour, face by face from either side, and what flux operators enter there."""
 
     def __init__(self, strip: Strip):
-        faces, self.own = strip.faces, strip.owned
-        self._behind = np.flatnonzero(faces.behind < self.own)  # faces with an own cell behind them
-        self._ahead = np.flatnonzero(faces.ahead < self.own)
-        self._cell_behind, self._cell_ahead = faces.behind[self._behind], faces.ahead[self._ahead]
-        self.cells = np.concatenate([self._cell_behind, self._cell_ahead])
+        faces, own = strip.faces, strip.owned
+        self._behind = np.flatnonzero(faces.behind < own)  # faces with an own cell behind them
+        self._ahead = np.flatnonzero(faces.ahead < own)
+        self.cells = np.concatenate([faces.behind[self._behind], faces.ahead[self._ahead]])
         self.neighbours = np.concatenate([faces.ahead[self._behind], faces.behind[self._ahead]])
 
     def coupling(self, operator: FluxOperator) -> Floats:
         """Entries that couple `cells` to `neighbours`, (pairs,) [m2/s]."""
-        return np.concatenate([-operator.from_ahead[self._behind], -operator.from_behind[self._ahead]])
-
-    def diagonal(self, operator: FluxOperator) -> Floats:
-        """What leaves each own cell per concentration, through faces and ports, (own,) [m2/s]."""
-        diagonal = np.bincount(self._cell_behind, operator.from_behind[self._behind], self.own)
-        diagonal += np.bincount(self._cell_ahead, operator.from_ahead[self._ahead], self.own)
-        for port in (*operator.inlets.values(), *operator.outlets.values()):
-            np.add.at(diagonal, port.cells, port.out)
-        return diagonal
+        entries, split = np.empty(len(self.cells)), len(self._behind)
+        np.negative(operator.from_ahead[self._behind], out=entries[:split])
+        np.negative(operator.from_behind[self._ahead], out=entries[split:])
+        return entries
 
 
 def interleaved(row: Ints, column: Ints) -> Ints:
@@ -85,9 +79,10 @@ class CellMatrix:
         """Enter the face fluxes of one operator per unknown; returns what they add to the diagonal, (unknowns, own) [m2/s]."""
         versions = [operator.version for operator in operators]
         if versions != self._versions:
-            diagonals = {operator.version: self.pattern.diagonal(operator) for operator in operators}
-            self._outflow = np.stack([diagonals[version] for version in versions])
-            self._values[: self._couplings] = np.concatenate([self.pattern.coupling(o) for o in operators])
+            self._outflow = np.stack([operator.outflow for operator in operators])
+            pairs = len(self.pattern.cells)
+            for i, operator in enumerate(operators):
+                self._values[i * pairs : (i + 1) * pairs] = self.pattern.coupling(operator)
             self._versions, self._holds_fluxes = versions, False
         return self._outflow
 

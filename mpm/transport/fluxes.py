@@ -87,8 +87,9 @@ class PortFlux:
 class FluxOperator:
     """Discrete div(u C - D grad C) for one velocity field and one diffusivity.
 
-    The flux through a face is `from_behind` C_behind - `from_ahead` C_ahead, (faces,) [m2/s]; `inlets` and `outlets` by name; `drawn_in`
-    tells on every rank whether any outlet draws gas back in. No two operators of a process have the same `version`: matrices know by it
+    The flux through a face is `from_behind` C_behind - `from_ahead` C_ahead, (faces,) [m2/s]; `inlets` and `outlets` by name; `outflow` is
+    what leaves each own cell per concentration, through faces and ports, (own,) [m2/s]; `drawn_in` tells on every rank whether any outlet
+    draws gas back in. No two operators of a process have the same `version`: matrices know by it
     what they hold.
     """
 
@@ -96,6 +97,7 @@ class FluxOperator:
     from_ahead: Floats
     inlets: dict[str, PortFlux]
     outlets: dict[str, PortFlux]
+    outflow: Floats
     drawn_in: bool
     version: int = field(default_factory=count().__next__)
 
@@ -113,10 +115,19 @@ class FluxAssembler:
         inlets = {inlet.name: self._inlet(inlet, flow) for inlet in self.case.geometry.inlets}
         outlets = {outlet.name: self._outlet(outlet, flow) for outlet in self.case.geometry.outlets}
         drawn = any(np.any(port.into > 0.0) for port in outlets.values())
-        length = self.strip.face_length
+        from_behind, from_ahead = from_behind * self.strip.face_length, from_ahead * self.strip.face_length
+        outflow = self._outflow(from_behind, from_ahead, [*inlets.values(), *outlets.values()])
         return FluxOperator(
-            from_behind * length, from_ahead * length, inlets, outlets, any_rank(self.strip.comm, drawn)
+            from_behind, from_ahead, inlets, outlets, outflow, any_rank(self.strip.comm, drawn)
         )
+
+    def _outflow(self, from_behind: Floats, from_ahead: Floats, ports: list[PortFlux]) -> Floats:
+        strip = self.strip
+        outflow = np.bincount(strip.faces.behind, from_behind, len(strip.cell))
+        outflow += np.bincount(strip.faces.ahead, from_ahead, len(strip.cell))
+        for port in ports:
+            np.add.at(outflow, port.cells, port.out)
+        return np.array(outflow[: strip.owned])
 
     def _inlet(self, inlet: Inlet, flow: FaceFlow) -> PortFlux:
         """Diffuses as well, over half a cell, where the case lets it (`geometry.inlet_diffusion`)."""

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.physics.mechanism import GasReaction, SurfaceReaction
 
+EXACT = 1e-9  # of the stoichiometric coefficients: sums that agree to this are equal
+
 
 @dataclass(frozen=True, eq=False)
 class Events:
@@ -37,7 +39,7 @@ class Events:
 class Reactions:
     """The reactions that run on the coverages and in the own cells of a strip, among the species of `roles`.
 
-    `surface` and `gas` are their kinetics; `species` the names of all species that run, reacting ones first.
+    `surface` and `gas` are their kinetics; `species` the names of all species that run, reacting ones first. `tied` as in `_tied`.
     """
 
     def __init__(self, case: Case, strip: Strip, coverage: Coverage, roles: Roles):
@@ -48,11 +50,22 @@ class Reactions:
         self.gas = GasKinetics(case.mechanism, roles.coupled, temperature)
         self._nu_surface = self._stoichiometry(self.surface.reactions)
         self._nu_gas = self._stoichiometry(self.gas.reactions)
+        self.tied = self._tied()
 
     def _stoichiometry(self, reactions: Sequence[SurfaceReaction | GasReaction]) -> Floats:
         """nu (reactions, species), per event."""
         rows = [[r.nu_gas.get(name, 0.0) for name in self.species] for r in reactions]
         return np.array(rows).reshape(len(reactions), len(self.species))
+
+    def _tied(self) -> Floats:
+        """lambda (products, coupled) for which no reaction changes C_i + sum_j lambda_ij C_j; none for products that have no such numbers.
+
+        Where species diffuse alike, such a sum is carried like an inert gas.
+        """
+        nu = np.concatenate([self._nu_surface, self._nu_gas])
+        used, made = nu[:, : self.coupled], nu[:, self.coupled :]
+        tied = np.linalg.lstsq(used, -made, rcond=None)[0]
+        return np.where(np.abs(used @ tied + made).max(axis=0, initial=0.0) < EXACT, tied, 0.0).T
 
     @property
     def gas_volume(self) -> Floats:

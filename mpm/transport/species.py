@@ -26,6 +26,7 @@ from mpm.physics.roles import Roles
 from mpm.transport.cell_matrix import CellMatrix, StepMatrix, interleaved
 from mpm.transport.coverage import Coverage, Memento
 from mpm.transport.fluxes import FluxAssembler, FluxOperator, cell_diffusivity
+from mpm.transport.foresight import REMEMBERED, Past, possible
 from mpm.transport.ledger import Entries, Ledger
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Events, Reactions
@@ -55,8 +56,7 @@ class Transport:
     """Concentrations of all species that can appear, and the solvers that advance them.
 
     `names` are those species, the first `coupled` of them react; `concentration` (species, own cells) [mol/m3] is an array that is
-    replaced, never changed in place, `earlier` that at the beginning of the last step, which took `last_step` [s]. `diffusivities` [m2/s]
-    are those that differ.
+    replaced, never changed in place, `past` what it was before. `diffusivities` [m2/s] are those that differ.
     """
 
     def __init__(self, case: Case, strip: Strip, coverage: Coverage):
@@ -68,7 +68,7 @@ class Transport:
         self.ports = Ports(case, strip, self.names)
         self.ledger = Ledger(self.ports, self.reactions)
         self.concentration = np.zeros((len(self.names), strip.owned))
-        self.earlier, self.last_step = self.concentration, 1.0
+        self.past = Past(REMEMBERED[case.fidelity])
         diffusivities = [case.gas.diffusivity[name] for name in self.names]
         self.diffusivities = sorted(set(diffusivities))
         self._group = [self.diffusivities.index(d) for d in diffusivities]
@@ -126,17 +126,18 @@ class Transport:
 
     def stored(self, scatter: Scatter) -> dict[str, Any]:
         """Arrays of a restart state, in grid order on rank 0 (None elsewhere); collective."""
-        both = scatter.to_root(np.stack([self.concentration, self.earlier]))
+        all_states = scatter.to_root(np.stack([self.concentration, *self.past.states]))
         return {
-            "concentration": None if both is None else both[0],
-            "earlier": None if both is None else both[1],
-            "last_step": self.last_step,
+            "concentration": None if all_states is None else all_states[0],
+            "past": None if all_states is None else all_states[1:],
+            "last_step": self.past.dt,
         }
 
     def restore(self, scatter: Scatter, stored: dict[str, Any]) -> None:
         """The inverse of `stored`, on every rank."""
         self.concentration = scatter.to_local(stored["concentration"])
-        self.earlier, self.last_step = scatter.to_local(stored["earlier"]), float(stored["last_step"])
+        states = tuple(scatter.to_local(stored["past"]))
+        self.past = Past(self.past.limit, states, float(stored["last_step"]))
 
     # --- one step ---
 
@@ -148,13 +149,7 @@ class Transport:
         Steps that `recurs` are many with the same operators and the same `dt`. A step whose Newton iteration fails is halved, up to
         HALVINGS times. Raises ConvergenceError after that.
         """
-        before = (
-            self.concentration,
-            self.earlier,
-            self.last_step,
-            self.coverage.memento(),
-            self.ledger.memento(),
-        )
+        before = self.concentration, self.past, self.coverage.memento(), self.ledger.memento()
         try:
             self._advance(operators, t0, dt, recurs)
         except ConvergenceError as error:
@@ -168,10 +163,8 @@ class Transport:
                 self._recall(*before)
                 raise
 
-    def _recall(
-        self, concentration: Floats, earlier: Floats, last_step: float, coverage: Memento, ledger: Entries
-    ) -> None:
-        self.concentration, self.earlier, self.last_step = concentration, earlier, last_step
+    def _recall(self, concentration: Floats, past: Past, coverage: Memento, ledger: Entries) -> None:
+        self.concentration, self.past = concentration, past
         self.coverage.recall(coverage)
         self.ledger.recall(ledger)
 
@@ -181,23 +174,27 @@ class Transport:
         shares = self.ports.shares(t0, dt)
         supply = self.ports.supply(operators, shares, drawn)
         new, events = old.copy(), self.reactions.none()
+        foreseen = self.past.foreseen(old, dt)
         if self._newton is not None:
             new[:coupled], events = self._solve_coupled(
-                self._newton, operators[:coupled], dt, old[:coupled], supply[:coupled]
+                self._newton, operators[:coupled], dt, old[:coupled], supply[:coupled], foreseen[:coupled]
             )
             self.coverage.react(self.reactions.surface, new[:coupled][:, self.coverage.cells], dt)
         made = self.reactions.made(events, slice(coupled, None))
+        # where more has reacted than was foreseen, more is made
+        missed = self.reactions.tied @ (foreseen[:coupled] - new[:coupled])
         storage = self.reactions.gas_volume / dt
         for i in range(coupled, len(self.names)):
             matrix = self._linear[self._group[i]]
             matrix.update(operators[i], dt)
             rhs = storage * old[i] + supply[i] + made[i - coupled]
-            new[i] = matrix.solve(rhs, old[i], recurs)
-        self.concentration, self.earlier, self.last_step = new, old, dt
+            guess = foreseen[i] + missed[i - coupled]
+            new[i] = matrix.solve(rhs, possible(guess, old[i]), recurs)
+        self.concentration, self.past = new, self.past.followed_by(old, dt)
         self.ledger.book(self.ports, operators, new, dt, shares, drawn, events)
 
     def _solve_coupled(
-        self, newton: _Newton, operators: Operators, dt: float, old: Floats, supply: Floats
+        self, newton: _Newton, operators: Operators, dt: float, old: Floats, supply: Floats, foreseen: Floats
     ) -> tuple[Floats, Events]:
         """Inexact Newton on the reacting species; returns their concentrations at the end of the step and the events of it."""
         reactions, cells, theta = self.reactions, self.coverage.cells, self.coverage.theta
@@ -205,7 +202,7 @@ class Transport:
         storage = reactions.gas_volume / dt
         diagonal = newton.set_fluxes(operators) + storage
         rhs = storage * old + supply
-        new = self._foreseen(dt)[: self.coupled]
+        new = possible(foreseen, old)
         new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
         scale = max(self.ports.feed_rate, NO_FEED)
         for iteration in range(NEWTON_LIMIT):
@@ -231,12 +228,6 @@ class Transport:
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
             f"{worst:.3g} of the feed, lowest concentration {low:.3g} mol/m3"
         )
-
-    def _foreseen(self, dt: float) -> Floats:
-        """Concentrations after `dt` [s] if they go on as in the last step; as they are where that would take more than there is."""
-        now = self.concentration
-        then = now + dt / self.last_step * (now - self.earlier)
-        return np.where(then > 0.0, then, now)
 
     def _balance(
         self, new: Floats, matrices: list[StepMatrix], diagonal: Floats, rhs: Floats, dt: float

@@ -70,7 +70,7 @@ class SteadySystem:
         self.shares = self.ports.steady_shares
         self.storage = self.reactions.gas_volume
         self._faces = FacePattern(self.strip)
-        self.outflow = np.stack([self._faces.diagonal(operator) for operator in self.operators])
+        self.outflow = np.stack([operator.outflow for operator in self.operators])
         self.start = Iterate(self.transport.concentration[: self.coupled].copy(), self.coverage.theta)
         held = total(self.strip.comm, [self.coverage.capacity[self.conveyor.resting].sum()])[0]
         self.last_step = max(LAST_STEP, float(held) / (STORED * self.ports.feed_rate))
