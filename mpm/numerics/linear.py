@@ -71,7 +71,8 @@ class DirectSolver:
 class KrylovSolver:
     """BiCGStab with incomplete LU on each rank; the right choice for advection-diffusion-reaction with small steps.
 
-    Its flexible form: two reductions per iteration instead of four, fewer passes over vectors, and a residual that is the true one.
+    On one rank in its flexible form, with fewer passes over vectors; on several that one, whose residual is not preconditioned, would stop
+    before traces far from their inlet are as exact.
 
     `fill` levels of fill-in pay for themselves in long steps, or where one factor serves many solves; COMPLETE factors where it serves
     hundreds. On one rank such a factor solves by itself.
@@ -83,7 +84,7 @@ class KrylovSolver:
         self.ksp.setOperators(matrix)
         self.ksp.setTolerances(rtol=tolerance, atol=0.0, divtol=DIVERGED, max_it=ITERATIONS)
         alone = matrix.comm.size == 1
-        self.ksp.setType("preonly" if alone and fill == COMPLETE else "fbcgsr")
+        self.ksp.setType(("preonly" if fill == COMPLETE else "fbcgsr") if alone else "bcgs")
         self._blocks = not alone  # to be told of `fill`; they exist once there is a matrix to solve with
         self._fill = fill
         if alone:
