@@ -127,7 +127,7 @@ class StepMatrix:
         """BiCGStab from own values `guess` to the solution, (own,); collective. Raises ConvergenceError.
 
         Where the matrix `recurs`, step after step, with a complete factor of it that is kept (49,731 cells: 3 ms instead of 14). On several
-        ranks complete factors of their blocks save one iteration in ten and cost five times as much in each.
+        ranks complete factors of their blocks save one iteration in ten and cost more in each (on two, 90 ms per averaged step, not 58).
         """
         solver = self._solvers.get(recurs)
         if solver is None:
