@@ -47,6 +47,8 @@ FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
 QUADRATIC = 0.3  # inner tolerance over the residual, whose next value is about its square in any case
 # what the inner tolerance aims at, and no further: traces far from their inlet are reported too
 LAST = 1e-5 * RESIDUAL
+# Krylov iterations with the factor of an earlier matrix after which the next system gets its own, which costs as much as three of them
+PATIENCE = 5
 HALVINGS = 6
 BALANCED = 1e-4  # residual below which Newton's steps have no need of balanced cells
 NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
@@ -221,7 +223,7 @@ class Transport:
             blocks = -reactions.slopes(slopes, gas_slopes)
             for i in range(self.coupled):
                 blocks[:, i, i] += diagonal[i]
-            new = new - newton.solve(blocks, residual, forcing(worst), refactor=iteration == 0)
+            new = new - newton.solve(blocks, residual, forcing(worst), first=iteration == 0)
             if worst > BALANCED:
                 new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(
@@ -259,16 +261,21 @@ class _Newton:
         self.cells = CellMatrix(strip, unknowns, self.order)
         self.krylov = KrylovSolver(self.cells.matrix, "reacting species", FORCING, fill=fill)
         self.step, self.rhs = self.cells.matrix.createVecs()
+        self._iterations = 0  # of the last solve
 
     def set_fluxes(self, operators: Sequence[FluxOperator]) -> Floats:
         """Enter the fluxes of the unknowns; returns what they add to the diagonal, (unknowns, own) [m2/s]."""
         return self.cells.set_fluxes(operators)
 
-    def solve(self, blocks: Floats, residual: Floats, tolerance: float, refactor: bool) -> Floats:
-        """The step (unknowns, own) with `blocks` (own, unknowns, unknowns) on the diagonal; collective."""
+    def solve(self, blocks: Floats, residual: Floats, tolerance: float, first: bool) -> Floats:
+        """The step (unknowns, own) with `blocks` (own, unknowns, unknowns) on the diagonal, the `first` of an iteration or not; collective.
+
+        The factor of the first matrix serves as long as it serves well: cells in which sites run out change the matrix.
+        """
         self.cells.assemble(blocks)
         self.rhs.array[:] = residual[:, self.order].T.ravel()
-        self.krylov.solve(self.rhs, self.step, tolerance, refactor=refactor)
+        refactor = first or self._iterations > PATIENCE
+        self._iterations = self.krylov.solve(self.rhs, self.step, tolerance, refactor=refactor)
         step = np.empty_like(residual)
         step[:, self.order] = self.step.array.reshape(-1, self.unknowns).T
         return step
