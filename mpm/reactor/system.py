@@ -113,7 +113,8 @@ class System:
             velocity = self.flow.sequence.at(step)
             self.coverage.slide(self._slide(step))
             operators = self.operators(velocity, step.phase == RESTING)
-            self.transport.advance(operators, step.t0, step.dt, self.schedule.recurs(step))
+            recurs = self.schedule.recurs(step) and not isinstance(self.flow.sequence, MarchedFlow)
+            self.transport.advance(operators, step.t0, step.dt, recurs)
         except ConvergenceError as error:
             self.coverage.recall(before)
             raise ConvergenceError(f"step {step.index + 1}: {error}") from error

@@ -8,12 +8,12 @@ import numpy as np
 
 from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import Strip
-from mpm.numerics.linear import COMPLETE, KrylovSolver
+from mpm.numerics.linear import KrylovSolver, ServingSolver
 from mpm.numerics.sparse import sparse_matrix
 from mpm.transport.fluxes import FluxOperator
 
 STREAMS = 4  # pieces of a rank that a triangular solve goes through at once
-RECURRING = 1e-12  # residual of what complete factors solve
+FEW = 4  # ranks on which solving the whole system on each takes less time than iterating together (11 iterations of its matrix on two)
 
 
 class FacePattern:
@@ -104,10 +104,13 @@ class StepMatrix:
     """
 
     def __init__(self, strip: Strip, name: str, residual: float, fill: int = 0):
-        self.strip, self.name, self.residual, self.fill = strip, name, residual, fill
+        self.strip, self.name = strip, name
         self.cells = CellMatrix(strip, 1)
         self._holds: tuple[int, float] | None = None
-        self._solvers: dict[bool, KrylovSolver] = {}  # by whether the matrix recurs
+        self._krylov = KrylovSolver(self.cells.matrix, name, 0.0, fill=fill)
+        least = residual / np.sqrt(max(self.cells.matrix.size[0], 1))
+        self._krylov.ksp.setTolerances(rtol=1e-13, atol=least)
+        self._serving: ServingSolver | None = None  # once the matrix recurs
         self._x, self._y = self.cells.matrix.createVecs()
 
     def update(self, operator: FluxOperator, dt: float) -> None:
@@ -126,18 +129,13 @@ class StepMatrix:
     def solve(self, rhs: Floats, guess: Floats, recurs: bool = False) -> Floats:
         """BiCGStab from own values `guess` to the solution, (own,); collective. Raises ConvergenceError.
 
-        Where the matrix `recurs`, step after step, with a complete factor of it that is kept (49,731 cells: 3 ms instead of 14). On several
-        ranks complete factors of their blocks save one iteration in ten and cost more in each (on two, 90 ms per averaged step, not 58).
+        Where the matrix `recurs`, step after step, with a complete factor of it that is kept, on a FEW ranks.
         """
-        solver = self._solvers.get(recurs)
-        if solver is None:
-            fill = COMPLETE if recurs and self.strip.comm.size == 1 else self.fill
-            solver = self._solvers[recurs] = KrylovSolver(self.cells.matrix, self.name, 0.0, fill=fill)
-            least = self.residual / np.sqrt(max(self.cells.matrix.size[0], 1))
-            # a complete factor solves as well on one rank, to rounding, as incomplete ones must on several
-            rtol, atol = (RECURRING, RECURRING * least) if recurs else (1e-13, least)
-            solver.ksp.setTolerances(rtol=rtol, atol=atol)
         self._y.array[:] = rhs
-        self._x.array[:] = guess
-        solver.solve(self._y, self._x, guess=True)
+        if recurs and self.strip.comm.size <= FEW:
+            self._serving = self._serving or ServingSolver(self.cells.matrix, self.name)
+            self._serving.solve(self._y, self._x, self._holds)
+        else:
+            self._x.array[:] = guess
+            self._krylov.solve(self._y, self._x, guess=True)
         return np.array(self._x.array)
