@@ -89,8 +89,7 @@ class FluxOperator:
 
     The flux through a face is `from_behind` C_behind - `from_ahead` C_ahead, (faces,) [m2/s]; `inlets` and `outlets` by name; `outflow` is
     what leaves each own cell per concentration, through faces and ports, (own,) [m2/s]; `drawn_in` tells on every rank whether any outlet
-    draws gas back in. No two operators of a process have the same `version`: matrices know by it
-    what they hold.
+    draws gas back in. No two operators of a process have the same `version`: matrices know by it what they hold.
     """
 
     from_behind: Floats
