@@ -266,9 +266,21 @@ def test_settings_in_the_explanations_are_accepted(capsys: pytest.CaptureFixture
 
     from mpm.case.settings import parse_settings
 
+    wall = {"name": "bottom", "side": "top", "end": "20 mm", "temperature": "400 K"}
     tried, phases = (
         0,
-        {"motion.profile": "phases", "motion.liftoff_phase": "90 deg", "motion.contact_phase": "10 deg"},
+        {
+            "motion.profile": "phases",
+            "motion.liftoff_phase": "90 deg",
+            "motion.contact_phase": "10 deg",
+            "energy": {},
+            "geometry.wall": [wall],
+        },
+    )
+    needs_another = (
+        "geometry.base",
+        "output.phases",
+        *(f"geometry.wall.<name>.{key}" for key in ("heat_transfer_coefficient", "ambient")),
     )
     for key in (key for key in all_keys() if not key.is_table):
         assert main(["explain", key.name]) == 0
@@ -277,7 +289,7 @@ def test_settings_in_the_explanations_are_accepted(capsys: pytest.CaptureFixture
             continue
         option, setting = shlex.split(line.removeprefix("  in a shell"))
         assert option == "--set"
-        if key.name not in ("geometry.base", "output.phases") and "chemistry." not in key.name:
+        if key.name not in needs_another and "chemistry." not in key.name:
             load_case("single_zone", phases | parse_settings([setting]))
         tried += 1
     assert tried > 50

@@ -40,7 +40,7 @@ def test_defaults_and_examples_are_toml(key: Key) -> None:
 def test_defaults_are_those_of_the_classes() -> None:
     """Fails when a default that is shown is not the one that an empty case gets."""
     layer = [{"name": "gas", "height": "1 mm", "cells": 2}]
-    bare = load_case({"geometry": {"length": "100 mm", "layer": layer}})
+    bare = load_case({"geometry": {"length": "100 mm", "layer": layer}, "energy": {}})
     shown = {key.name: key.default for key in all_keys() if key.default}
     assert len(shown) > 30
     written = {key: tomllib.loads(f"x = {text}")["x"] for key, text in shown.items() if "<" not in key}
@@ -133,6 +133,7 @@ OTHER = {
     "motion.gamma": 0.4, "motion.frequency": "20 Hz", "motion.angle": "50 deg", "motion.angle_from": "vertical",
     "motion.liftoff_velocity": "-0.5 cm/s", "motion.inlet_frame": "lab", "motion.startup": "impulsive", "motion.start": "70 ms",
     "time.end": "21 s", "time.step": "11 ms", "time.steps_per_cycle": 64, "output.every": "0.5 s", "output.checkpoint": "30 s",
+    "energy.initial_temperature": "300 K", "energy.flow_update": 0.02,
 }  # fmt: skip
 """A value that is not the default, of each key that not all fidelities read (but those that need others, or are refused)."""
 

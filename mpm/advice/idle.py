@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mpm.case.chemistry import HEATS
 from mpm.case.materials import BUILT_IN, Material
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _CYCLE = ("frequency", "angle", "angle_from", "liftoff_velocity", "liftoff_phase", "contact_phase")
 """Keys of [motion] that shape the cycle, not its mean."""
+_ISOTHERMAL = "temperature is one number, gas.temperature"
 
 
 def idle_keys(case: Case) -> list[str]:
@@ -27,6 +29,7 @@ def idle_keys(case: Case) -> list[str]:
         *_of_motion(case),
         *_of_time(case),
         *_of_ports(case),
+        *_of_energy(case),
         *_of_solids(case),
         *_of_mechanism(case),
     ):
@@ -107,6 +110,34 @@ def _of_ports(case: Case) -> Idle:
             yield from _typed(layer, f"geometry.layer.{layer.name}", ["grading"], "the layer has one row")
 
 
+def _of_energy(case: Case) -> Idle:
+    """Keys of temperature in a case that has one, or not."""
+    if case.energy is None:
+        yield from (
+            (f"gas.{key}", _ISOTHERMAL)
+            for key in ("heat_capacity", "conductivity")
+            if key in case.typed("gas")
+        )
+        for table in ("species", "site", "film", "reaction"):
+            for name in case.typed(f"chemistry.{table}"):
+                typed = case.typed(f"chemistry.{table}.{name}")
+                yield from ((f"chemistry.{table}.{name}.{key}", _ISOTHERMAL) for key in HEATS if key in typed)
+        return
+    if case.fidelity == "steady":
+        why = "a steady state has no time"
+        yield from _typed(case.energy, "energy", ["flow_update"], why)
+        if case.energy.initial_temperature != case.gas.temperature:
+            yield "energy.initial_temperature", why
+    geometry = case.geometry
+    if case.bed_temperature != case.gas.temperature and (
+        case.conveying_velocity == 0.0 or geometry.bed_inflow == "periodic"
+    ):
+        yield "geometry.bed_temperature", "no fresh solids come in"
+    for inlet in geometry.inlets:
+        if inlet.velocity == 0.0 and case.inlet_temperature(inlet) != case.gas.temperature:
+            yield f"geometry.inlet.{inlet.name}.temperature", "the inlet is closed (velocity 0)"
+
+
 def _of_solids(case: Case) -> Idle:
     used = {layer.material_name for layer in case.geometry.layers}
     for name in case.typed("material"):
@@ -116,9 +147,17 @@ def _of_solids(case: Case) -> Idle:
         given = case.typed(f"material.{name}")
         material = case.materials[name]
         usual = Material.model_validate(BUILT_IN[name]) if name in BUILT_IN else None
-        for key in ("heat_capacity", "conductivity"):
-            if key in given and (usual is None or getattr(usual, key) != getattr(material, key)):
-                yield f"material.{name}.{key}", "temperature is one number, gas.temperature"
+        for key in ("heat_capacity", "conductivity", "effective_conductivity"):
+            differs = usual is None or getattr(usual, key) != getattr(material, key)
+            if key in given and differs and case.energy is None:
+                yield f"material.{name}.{key}", _ISOTHERMAL
+            elif (
+                key == "conductivity"
+                and key in given
+                and differs
+                and material.effective_conductivity is not None
+            ):
+                yield f"material.{name}.{key}", "the layer has an effective_conductivity"
         if "kozeny_constant" in given and material.particle_diameter is None:
             yield f"material.{name}.kozeny_constant", "it needs a particle_diameter"
 

@@ -18,6 +18,7 @@ from typing import Any
 
 from pydantic import PrivateAttr, ValidationError
 
+from mpm.case.chemistry import drop_heats
 from mpm.case.kinds import CASE, read_input
 from mpm.case.messages import to_input_error
 from mpm.case.names import case_file
@@ -25,6 +26,7 @@ from mpm.case.notebook import case_html
 from mpm.case.schema import DRAFT, finished
 from mpm.case.sources import assemble, write_toml
 from mpm.case.tables import CaseTables
+from mpm.case.walls import named_walls
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,10 @@ class Case(CaseTables):
 
     def to_dict(self) -> dict[str, Any]:
         """The resolved case as the tables of a case file, dimensional values as strings in SI units."""
-        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        tables: dict[str, Any] = self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        if self.energy is None and self.chemistry.mechanism != "inline":
+            drop_heats(tables["chemistry"])
+        return tables
 
     def to_toml(self) -> str:
         """The resolved case as a case file that can be run as it is."""
@@ -118,6 +123,7 @@ def case_schema() -> dict[str, Any]:
 
 
 def build_case(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, label: str) -> Case:
+    data, overrides = named_walls(data), named_walls(overrides)
     tables = assemble(data, overrides, folder, label)
     try:
         case = Case.model_validate(tables)

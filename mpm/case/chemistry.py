@@ -20,6 +20,8 @@ from mpm.units import (
     Density,
     Dimension,
     MolarEnergy,
+    MolarEnthalpy,
+    MolarHeatCapacity,
     MolarMass,
     Number,
     Sticking,
@@ -29,6 +31,8 @@ from mpm.units import (
     worked_out,
 )
 
+HEATS = ("enthalpy", "heat_capacity", "heat_of_reaction")
+"""Keys of a mechanism that say how much heat reactions set free."""
 SURFACE_RATE = Dimension("m/s", "a surface rate constant", "0.9 m/s", at_least=0.0)
 GAS_RATE = Dimension("m^3/mol/s", "a second-order rate constant", "1.0 m^3/kmol/s", at_least=0.0)
 
@@ -69,6 +73,10 @@ class SpeciesTable(_Table):
         "counted in the formula", None, example={"Al": 1, "C": 3, "H": 9}
     )
     """atoms of each element, in place of a formula"""
+    enthalpy: MolarEnthalpy | None = None
+    """enthalpy of formation at 298.15 K, for the heat of reactions; of sites only differences count, from any zero"""
+    heat_capacity: MolarHeatCapacity | None = None
+    """molar heat capacity: a reaction with those of all its parts has a heat that follows temperature"""
 
 
 class SiteTable(_Table):
@@ -82,6 +90,10 @@ class SiteTable(_Table):
         "counted in the formula", None, example={"Al": 1, "C": 3, "H": 9}
     )
     """atoms of each element, in place of a formula"""
+    enthalpy: MolarEnthalpy | None = None
+    """enthalpy of formation at 298.15 K, for the heat of reactions; of sites only differences count, from any zero"""
+    heat_capacity: MolarHeatCapacity | None = None
+    """molar heat capacity: a reaction with those of all its parts has a heat that follows temperature"""
 
 
 class FilmTable(SiteTable):
@@ -106,6 +118,8 @@ class ReactionTable(_Table):
     """activation energy"""
     reference_temperature: Temperature = 1.0
     """temperature at which the factor of b is 1"""
+    heat_of_reaction: MolarEnthalpy | None = None
+    """heat per mol of events as the equation is written, below 0 where it is set free; in place of what enthalpies give"""
 
 
 class Chemistry(_Table):
@@ -123,6 +137,14 @@ class Chemistry(_Table):
     """solid products, by name"""
     reaction: dict[str, ReactionTable] = Field({})
     """reactions, by name; keys given here lie over the mechanism's, e.g. chemistry.reaction.tma.sticking = 0.1"""
+
+
+def drop_heats(tables: dict[str, Any]) -> None:
+    """Take enthalpies and the like out of the tables of `[chemistry]`: what a case without [energy] does not read and has not typed."""
+    for kind in ("species", "site", "film", "reaction"):
+        for entry in tables.get(kind, {}).values():
+            for key in HEATS:
+                entry.pop(key, None)
 
 
 def mechanism_schema() -> dict[str, Any]:

@@ -7,16 +7,23 @@ geometry itself: names, ports inside the strip, no overlaps, no facet that an ou
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from mpm.case.layers import Layer, check_moving, check_sizes
 from mpm.case.materials import Material
 from mpm.case.model import Flag, Frozen, nothing_required
 from mpm.case.ports import Inlet, Outlet, Port, check_inside, check_side
+from mpm.case.walls import Wall, check_walls
 from mpm.case.zones import Zone, check_zones, default_zones
-from mpm.units import ColumnWidth, StripLength, reject, worked_out
+from mpm.units import ColumnWidth, StripLength, Temperature, reject, worked_out
 
 WALLS = ("left", "right", "bottom_wall", "top_wall")
 """Physical groups of a mesh file beside layers and ports. Readers such as meshio know a group by its name alone."""
@@ -41,6 +48,8 @@ class Geometry(Frozen):
     """ends of the strip for the gas. true: what leaves at one end comes in at the other (a stretch of a longer reactor); false: walls"""
     bed_inflow: Literal["fresh", "periodic"] = "fresh"
     """solids that enter the strip: fresh with their initial_coverage, or (periodic) those that have left at the other end"""
+    bed_temperature: Temperature | None = worked_out("gas.temperature", None, example="25 degC")
+    """temperature of solids that enter the strip fresh; needs a table [energy]"""
     inlet_diffusion: Flag = False
     """whether precursor also diffuses through the face of an inlet; false: an inlet feeds exactly velocity times concentration"""
     layers: tuple[Layer, ...] = Field(alias="layer", min_length=1)
@@ -53,6 +62,8 @@ class Geometry(Frozen):
         "as many equal zones as inlets that dose, one in each", (), alias="zone"
     )
     """stretches of the strip that results are given for, each with its inlet"""
+    walls: tuple[Wall, ...] = Field((), alias="wall")
+    """stretches of the sides that give or take heat (all else is insulated); they need a table [energy]"""
 
     @property
     def columns(self) -> int:
@@ -89,6 +100,21 @@ class Geometry(Frozen):
         for layer in self.layers:
             layer.complete(materials)
 
+    def complete_temperatures(self, temperature: float) -> None:
+        """Fill in temperatures [K] of what comes in, where they are left out; a case with [energy] does this."""
+        for inlet in self.inlets:
+            if inlet.temperature is None:
+                inlet._fill(temperature=temperature)
+        if self.bed_temperature is None and self.moving_layer is not None:
+            self._fill(bed_temperature=temperature)
+
+    @model_serializer(mode="wrap")
+    def _write_walls_where_there_are_some(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        table: dict[str, Any] = handler(self)
+        if not self.walls:
+            table.pop("wall", None)
+        return table
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.periodic and self.columns < 3:
@@ -114,6 +140,10 @@ class Geometry(Frozen):
             raise reject("inlets but no outlet", "at least one outlet", key="outlet")
         if not self.zones:
             self._fill(zones=default_zones(self.inlets, self.length))
+        for wall in self.walls:
+            wall.complete(length=self.length, height=self.height)
+        _check_names("wall", self.walls)
+        check_walls(self.walls, self.ports, length=self.length, height=self.height, periodic=self.periodic)
         check_zones(self.zones, self.inlets, length=self.length, dx=self.dx)
         return self
 
@@ -138,7 +168,7 @@ def _check_reserved(layers: Sequence[Layer], ports: Sequence[Port]) -> None:
             )
 
 
-def _check_names(kind: str, entries: Iterable[Layer | Port | Zone]) -> None:
+def _check_names(kind: str, entries: Iterable[Layer | Port | Zone | Wall]) -> None:
     seen: set[str] = set()
     for entry in entries:
         if entry.name in seen:

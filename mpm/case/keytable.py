@@ -44,6 +44,8 @@ READ_BY = {
     "output.checkpoint": _TIMED,
     "output.phases": "resolved",
     "transport.vibrational_dispersion": "averaged, steady",
+    "energy.initial_temperature": _TIMED,
+    "energy.flow_update": _TIMED,
 }
 """Fidelities that read a key, where not all of them do (`mpm.advice.idle` says so of a case)."""
 
@@ -62,6 +64,12 @@ _TOGETHER = (
     ("output.phases", "output.every", "time.steps_per_cycle", "motion.frequency"),
     ("gas.carrier", "gas.molar_mass", "gas.viscosity", "gas.density", "gas.temperature", "gas.pressure"),
     ("gas.diffusivity", "gas.carrier", "gas.temperature", "gas.pressure"),
+    ("gas.temperature", "energy", "energy.initial_temperature", "geometry.bed_temperature", "geometry.inlet.<name>.temperature"),
+    tuple(f"geometry.wall.<name>.{key}" for key in ("temperature", "heat_flux", "heat_transfer_coefficient", "ambient")),
+    ("energy.conductivity_model", "gas.conductivity", *(f"material.<name>.{key}" for key in ("conductivity", "effective_conductivity"))),
+    ("gas.heat_capacity", "material.<name>.heat_capacity", "material.<name>.density"),
+    ("material.<name>.pore_diameter", "material.<name>.permeability", "gas.pressure"),
+    (*(f"chemistry.{k}.<name>.enthalpy" for k in ("species", "site", "film")), "chemistry.reaction.<name>.heat_of_reaction"),
     ("fidelity", "time.end", "time.step", "time.steps_per_cycle", "transport.vibrational_dispersion"),
     tuple(f"chemistry.reaction.<name>.{key}" for key in ("equation", "sticking", "A", "b", "Ea", "reference_temperature")),
 )  # fmt: skip

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mpm.case.sources import Table, parse_toml, read_source, read_toml
+from mpm.case.merging import Table
+from mpm.case.sources import parse_toml, read_source, read_toml
 from mpm.errors import InputError
 
 
@@ -49,7 +50,7 @@ _BY_ENDING = {
     ".vtu": Kind("fields", "ParaView opens them"),
     ".py": Kind("a Python program", "python {path} runs it"),
 }  # fmt: skip
-_CASE_KEYS = {"geometry", "fidelity", "material", "gas", "chemistry", "motion", "time", "output", "transport"}
+_CASE_KEYS = {"geometry", "fidelity", "material", "gas", "chemistry", "motion", "time", "output", "transport", "energy"}  # fmt: skip
 
 
 def kind_of_tables(data: Mapping[str, Any]) -> Kind | None:

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import ConfigDict, Field, PrivateAttr, Strict
+from pydantic import (
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    Strict,
+    model_serializer,
+)
 
 from mpm.case.materials import Material
 from mpm.case.model import Flag, Frozen, Name, only_name_required
-from mpm.units import Length, Positive, reject
+from mpm.units import Heating, Length, Positive, reject, worked_out
 
 MOST_ROWS = 100_000
 """Rows of a layer beyond this are a slip, not a plan."""
@@ -38,7 +45,16 @@ class Layer(Frozen):
     """what fills the layer: the name of a built-in material or of a table [material.NAME]; left out: gas alone"""
     moving: Flag = False
     """whether this is the bed, which the vibration conveys (see motion.bed_velocity); at most one layer"""
+    heating: Heating = worked_out("none", 0.0, example="1e5 W/m^3")
+    """heat set free in the layer from without (a heater, microwaves), by volume; needs a table [energy]"""
     _material: Material | None = PrivateAttr()
+
+    @model_serializer(mode="wrap")
+    def _write_heating_where_there_is_some(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        table: dict[str, Any] = handler(self)
+        if self.heating == 0.0:
+            table.pop("heating", None)
+        return table
 
     def complete(self, materials: Mapping[str, Material]) -> None:
         """Find the material by its name; the case does this once its materials are read."""

@@ -17,7 +17,13 @@ from pydantic import BeforeValidator, ConfigDict, PlainSerializer, WithJsonSchem
 
 from mpm.case.model import Frozen, nothing_required
 from mpm.constants import AVOGADRO
-from mpm.physics.porous import kozeny_carman, particle_surface
+from mpm.physics.porous import (
+    bosanquet,
+    knudsen_diffusivity,
+    kozeny_carman,
+    particle_surface,
+    slip_factor,
+)
 from mpm.units import (
     Conductivity,
     Coverage,
@@ -137,9 +143,30 @@ class Material(Frozen):
     )
     """constant of Kozeny-Carman, with which particle_diameter gives the permeability"""
     heat_capacity: HeatCapacity | None = None
-    """of the solid, by mass; nothing reads it yet: temperature is one number, gas.temperature"""
+    """of the solid, by mass; read where there is a table [energy]"""
     conductivity: Conductivity | None = None
-    """thermal conductivity of the solid; nothing reads it yet: temperature is one number, gas.temperature"""
+    """thermal conductivity of the solid itself; read where there is a table [energy]"""
+    effective_conductivity: Conductivity | None = None
+    """thermal conductivity of solid and gas together, measured, in place of energy.conductivity_model"""
+    pore_diameter: Diameter | None = None
+    """width of the pores, for gas so thin that its molecules meet walls as often as each other: slip (more permeability) and Knudsen
+    diffusion (less diffusivity); left out: neither"""
+
+    def slip_permeability(self, free_path: float) -> tuple[float, float]:
+        """Permeability [m2] for a gas of mean free path `free_path` [m]: `permeability` where no pore_diameter is given (Klinkenberg)."""
+        if self.pore_diameter is None:
+            return self.permeability
+        factor = slip_factor(free_path, self.pore_diameter)
+        return self.permeability[0] * factor, self.permeability[1] * factor
+
+    def pore_diffusivity(self, diffusivity: float, molar_mass: float, temperature: float) -> float:
+        """Diffusivity [m2/s] between the walls of the pores of a species with `diffusivity` in free gas: the same without pore_diameter.
+
+        Porosity and tortuosity come on top of it (`mpm.physics.porous.effective_diffusivity`).
+        """
+        if self.pore_diameter is None or diffusivity == 0.0:
+            return diffusivity
+        return bosanquet(diffusivity, knudsen_diffusivity(self.pore_diameter, molar_mass, temperature))
 
     @model_validator(mode="after")
     def _fill_in(self) -> Self:

@@ -27,6 +27,7 @@ from mpm.units import (
     PortWidth,
     Position,
     Speed,
+    Temperature,
     describe,
     reject,
     worked_out,
@@ -111,6 +112,8 @@ class Inlet(Port):
     """speed of the gas through the inlet, at the reactor's temperature and pressure; 0: closed"""
     mass_fractions: dict[str, Fraction] = Field({}, examples=[{"TMA": 2e-4}])
     """mass fraction of each precursor in the gas of this inlet while it doses; left out: carrier gas alone (a purge)"""
+    temperature: Temperature | None = worked_out("gas.temperature", None, example="300 K")
+    """temperature of the gas of this inlet; needs a table [energy]"""
     start: Instant = 0.0
     """when the dose begins; before that the inlet blows carrier gas"""
     stop: Deadline = worked_out("never: the inlet doses to the end", math.inf)

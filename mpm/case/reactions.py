@@ -7,7 +7,15 @@ from collections.abc import Iterable, Mapping
 
 from pydantic_core import PydanticCustomError
 
-from mpm.case.chemistry import GAS_RATE, SURFACE_RATE, Chemistry, ReactionTable, SiteTable, SpeciesTable
+from mpm.case.chemistry import (
+    GAS_RATE,
+    SURFACE_RATE,
+    Chemistry,
+    FilmTable,
+    ReactionTable,
+    SiteTable,
+    SpeciesTable,
+)
 from mpm.physics.elements import parse_formula
 from mpm.physics.equation import ARROW, parse_equation, write_equation
 from mpm.physics.mechanism import GasReaction, Mechanism, Site, Species, SurfaceReaction
@@ -31,16 +39,16 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
     do not fit the kind of reaction.
     """
     species = {
-        name: Species(name, table.molar_mass, _elements("species", name, table))
+        name: Species(
+            name, table.molar_mass, _elements("species", name, table), table.enthalpy, table.heat_capacity
+        )
         for name, table in chemistry.species.items()
     }
     sites = {
-        name: Site(name, _elements("site", name, table), table.molar_mass)
-        for name, table in chemistry.site.items()
+        name: _site(name, _elements("site", name, table), table) for name, table in chemistry.site.items()
     }
     films = {
-        name: Site(name, _elements("film", name, table), table.molar_mass, table.density)
-        for name, table in chemistry.film.items()
+        name: _site(name, _elements("film", name, table), table) for name, table in chemistry.film.items()
     }
     _check_names({"species": species, "site": sites, "film": films})
     known: dict[str, Species | Site] = {**species, **sites, **films}
@@ -68,6 +76,18 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
     )
 
 
+def _site(name: str, elements: dict[str, float], table: SiteTable) -> Site:
+    """A site, or a film, which may have a density."""
+    return Site(
+        name,
+        elements,
+        table.molar_mass,
+        table.density if isinstance(table, FilmTable) else None,
+        table.enthalpy,
+        table.heat_capacity,
+    )
+
+
 def _check_names(tables: Mapping[str, Iterable[str]]) -> None:
     """Names are one word, and of one thing only."""
     seen: set[str] = set()
@@ -90,8 +110,7 @@ def _check_names(tables: Mapping[str, Iterable[str]]) -> None:
 
 def check_rates(mechanism: Mechanism, temperature: float) -> None:
     """Refuse a sticking coefficient above 1 and a rate constant beyond floats at `temperature` [K]."""
-    reactions: list[SurfaceReaction | GasReaction] = [*mechanism.surface_reactions, *mechanism.gas_reactions]
-    for reaction in reactions:
+    for reaction in mechanism.reactions:
         key = f"chemistry.reaction.{reaction.key}"
         if isinstance(reaction, SurfaceReaction):
             constant = reaction.rate_constant(temperature, mechanism.get(reaction.gas).molar_mass)
@@ -211,6 +230,7 @@ def _surface_reaction(
         nu_site={name: nu for name, nu in net.items() if name in sites},
         film={name: nu for name, nu in net.items() if name in films},
         sticking=table.sticking,
+        given_heat=table.heat_of_reaction,
     )
 
 
@@ -235,4 +255,5 @@ def _gas_reaction(
         reference_temperature=table.reference_temperature,
         nu_gas=_net(left, right),
         reactants=(first, second),
+        given_heat=table.heat_of_reaction,
     )

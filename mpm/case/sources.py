@@ -11,36 +11,21 @@ import tomllib
 from collections.abc import Collection, Mapping
 from copy import deepcopy
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 import tomli_w
 
 from mpm.case.materials import BUILT_IN
+from mpm.case.merging import Table, replaced
+from mpm.case.merging import merge as merge  # offered here too
 from mpm.case.profile import PRESETS
+from mpm.case.walls import name_walls
 from mpm.errors import InputError
 from mpm.files import is_file, read_text
 from mpm.spelling import quotes_advice
 
-Table = dict[str, Any]
-
 DEEPEST = 30
 """Levels of tables and lists in a file; a case needs five."""
-
-_ACTIVATION = ("b", "Ea", "reference_temperature")
-_REPLACES = {
-    "sticking": ("A",),
-    "A": ("sticking",),
-    "windows": ("start", "stop"),
-    "kozeny_constant": ("permeability",),
-    "permeability": ("kozeny_constant",),
-}
-"""A key written over a table removes the other ways to say the same from it."""
-
-
-def _replaced(table: Mapping[str, Any], key: str) -> tuple[str, ...]:
-    """Keys of `table` that `key`, written over it, replaces; b and Ea of a rate constant go with it, not those of the same kind."""
-    rivals = tuple(rival for rival in _REPLACES.get(key, ()) if rival in table)
-    return (*rivals, *_ACTIVATION) if key in ("sticking", "A") and rivals else rivals
 
 
 def read_toml(path: Path) -> Table:
@@ -111,43 +96,6 @@ def find_file(folder: str, name: str, near: Path, source: str, key: str) -> Path
     return path.resolve()
 
 
-def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:
-    """Lay table `over` upon table `under`: tables merge by key, lists of named tables by name, all else is replaced."""
-    gone = {rival for key in over for rival in _replaced(under, key)}
-    result = {key: value for key, value in under.items() if key not in gone}
-    for key, value in over.items():
-        below = result.get(key)
-        if isinstance(value, Mapping) and isinstance(below, Mapping):
-            result[key] = merge(below, value)
-        elif _named(value) and _named(below):
-            result[key] = _merge_lists(below, value)
-        else:
-            result[key] = deepcopy(value)
-    return result
-
-
-def _named(value: Any) -> TypeGuard[list[Table]]:
-    return (
-        isinstance(value, list)
-        and bool(value)
-        and all(isinstance(v, Mapping) and isinstance(v.get("name"), str) for v in value)
-    )
-
-
-def _merge_lists(under: list[Table], over: list[Table]) -> list[Table]:
-    result = [dict(entry) for entry in under]
-    places = {entry["name"]: i for i, entry in enumerate(result)}
-    for entry in over:
-        place = places.pop(
-            entry["name"], None
-        )  # a second entry of the same name is appended, and found out later
-        if place is None:
-            result.append(deepcopy(dict(entry)))
-        else:
-            result[place] = merge(result[place], entry)
-    return result
-
-
 def set_key(data: Table, key: str, value: Any, source: str, kept: Collection[str] = ()) -> None:
     """Set the entry at a dotted key such as `geometry.inlet.tma.velocity`; list entries are addressed by their name.
 
@@ -166,7 +114,7 @@ def set_key(data: Table, key: str, value: Any, source: str, kept: Collection[str
     if isinstance(node, list):
         raise InputError.at(source, key, "a whole entry", "a key of that entry, such as name", given="")
     value = value.tolist() if hasattr(value, "tolist") else value  # numpy scalars and arrays
-    for rival in _replaced(node, parts[-1]):
+    for rival in replaced(node, parts[-1]):
         if ".".join((*parts[:-1], rival)) not in kept:
             node.pop(rival, None)
     node[parts[-1]] = deepcopy(value)
@@ -220,7 +168,9 @@ def _with_base(geometry: Any, folder: Path, source: str, seen: tuple[Path, ...] 
     path = find_file("meshes", geometry["base"], folder, source, "geometry.base")
     if path in seen:
         raise InputError.at(source, "geometry.base", f"{path.name}, which leads back here", "another file")
-    shared = _with_base(read_toml(path).get("geometry", {}), path.parent, str(path), (*seen, path))
+    shared = _with_base(
+        name_walls(read_toml(path).get("geometry", {})), path.parent, str(path), (*seen, path)
+    )
     return merge(shared, {key: value for key, value in geometry.items() if key != "base"})
 
 

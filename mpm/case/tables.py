@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from mpm.case.chemistry import Chemistry
+from mpm.case.energy import Energy, check_heats, check_layers, without_energy
 from mpm.case.gas import Gas
 from mpm.case.geometry import Geometry
 from mpm.case.materials import Material
@@ -43,6 +44,8 @@ class CaseTables(Frozen):
     """how often results and restart states are written"""
     transport: TransportOptions = TransportOptions()
     """options of the species' transport"""
+    energy: Energy | None = None
+    """temperature as a field: present, it is solved for; absent, all is at gas.temperature"""
 
     _mechanism: Mechanism = PrivateAttr()
 
@@ -54,8 +57,22 @@ class CaseTables(Frozen):
         self._check_phases()
         check_rates(self._mechanism, self.gas.temperature)
         self.gas.complete(self._mechanism)
+        self._complete_energy()
         self._check_cycle()
         return self
+
+    def _complete_energy(self) -> None:
+        """Fill in temperatures that are left out, and see that heat has what it takes; without [energy] nothing may ask for it."""
+        if self.energy is None:
+            without_energy(self.geometry)
+            return
+        self.gas.complete_thermal()
+        self.energy.complete(self.gas.temperature)
+        self.geometry.complete_temperatures(self.gas.temperature)
+        check_layers(self.geometry.layers)
+        check_heats(self._mechanism)
+        for temperature in self.temperatures:
+            check_rates(self._mechanism, temperature)
 
     def _check_cycle(self) -> None:
         """What a run that sees the mean of the vibration only cannot answer."""
@@ -135,6 +152,25 @@ class CaseTables(Frozen):
                         given=name,
                         known=list(known),
                     )
+
+    def inlet_temperature(self, inlet: Inlet) -> float:
+        """Temperature of what an inlet blows [K]."""
+        return self.gas.temperature if inlet.temperature is None else inlet.temperature
+
+    @property
+    def bed_temperature(self) -> float:
+        """Temperature of solids that enter fresh [K]."""
+        given = self.geometry.bed_temperature
+        return self.gas.temperature if given is None else given
+
+    @property
+    def temperatures(self) -> tuple[float, ...]:
+        """All temperatures that the case gives to gas, solids and walls [K], in order; one without [energy]."""
+        if self.energy is None:
+            return (self.gas.temperature,)
+        walls = (t for wall in self.geometry.walls for t in (wall.temperature, wall.ambient) if t is not None)
+        inlets = (self.inlet_temperature(inlet) for inlet in self.geometry.inlets)
+        return tuple(sorted({self.energy.initial_temperature, self.bed_temperature, *inlets, *walls}))
 
     @property
     def mechanism(self) -> Mechanism:

@@ -16,11 +16,12 @@ from pydantic import PrivateAttr, ValidationError, model_validator
 
 from mpm.arrays import Floats
 from mpm.case.kinds import POWDER, read_input
+from mpm.case.merging import Table
 from mpm.case.messages import to_input_error
 from mpm.case.model import Frozen
 from mpm.case.names import powder_file
 from mpm.case.schema import DRAFT, finished
-from mpm.case.sources import Table, set_key
+from mpm.case.sources import set_key
 from mpm.units import reject
 
 from .base import SETTLED

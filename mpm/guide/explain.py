@@ -17,6 +17,7 @@ _NAMES = {
     "geometry.inlet": "tma",
     "geometry.outlet": "zone1",
     "geometry.zone": "zone1",
+    "geometry.wall": "bottom",
     "material": "glass_beads",
     "chemistry.species": "TMA",
     "chemistry.site": "OH",

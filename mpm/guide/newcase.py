@@ -42,6 +42,7 @@ _EXAMPLES = {
     "geometry.inlet": "tma",
     "geometry.outlet": "out",
     "geometry.zone": "zone1",
+    "geometry.wall": "bottom",
 }
 """Names of the entries that are shown where a case has none of its own."""
 _FOR_REFERENCE = ("material", "chemistry.reaction")

@@ -8,6 +8,8 @@ Rates are *rates of progress* of the reaction as written (Fluent's convention, e
     k(T) = A (T/T_ref)^b exp(-Ea/(R T)),    or  lambda sqrt(R T / (2 pi M))  with a sticking coefficient
     lambda(T) = sticking (T/T_ref)^b exp(-Ea/(R T)), the form a T^b exp(-Ea/(R T)) of Chemkin and Cantera with T_ref = 1 K
 
+Heat of a reaction: from enthalpies of formation of all that it changes, or given.
+
 Mechanisms are read from files and from the case by `mpm.case.chemistry`.
 """
 
@@ -15,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,31 +25,40 @@ from numpy.typing import ArrayLike
 from mpm.arrays import Floats
 from mpm.constants import GAS_CONSTANT
 
+STANDARD_TEMPERATURE = 298.15
+"""[K], of enthalpies of formation."""
+
 
 @dataclass(frozen=True)
 class Species:
-    """A gas species: molar mass [kg/mol], atoms per molecule."""
+    """A gas species: molar mass [kg/mol], atoms per molecule; if known, enthalpy of formation at 298.15 K [J/mol] and heat capacity
+    [J/mol/K]."""
 
     name: str
     molar_mass: float
     elements: Mapping[str, float]
+    enthalpy: float | None = None
+    heat_capacity: float | None = None
 
 
 @dataclass(frozen=True)
 class Site:
-    """A state of the surface sites, or a solid film: atoms per site (or formula unit), molar mass [kg/mol] and density [kg/m3] if known."""
+    """A state of the surface sites, or a solid film: atoms per site (or formula unit); if known, molar mass [kg/mol], density [kg/m3],
+    enthalpy of formation at 298.15 K [J/mol] and heat capacity [J/mol/K]."""
 
     name: str
     elements: Mapping[str, float]
     molar_mass: float | None = None
     density: float | None = None
+    enthalpy: float | None = None
+    heat_capacity: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Reaction:
     """What both kinds have: the key in the file, the equation, and k(T) = A (T/T_ref)^b exp(-Ea/(R T)).
 
-    nu_gas: signed molecules of each gas species per event, products positive.
+    nu_gas: signed molecules of each gas species per event, products positive. given_heat: J/mol of events, in place of enthalpies.
     """
 
     key: str
@@ -56,6 +68,12 @@ class _Reaction:
     Ea: float
     reference_temperature: float
     nu_gas: Mapping[str, float]
+    given_heat: float | None = None
+
+    @property
+    def changes(self) -> Mapping[str, float]:
+        """Signed amounts of all that an event changes: gas, sites and films."""
+        return self.nu_gas
 
     def __str__(self) -> str:
         return self.equation
@@ -106,6 +124,11 @@ class SurfaceReaction(_Reaction):
         Glarborg, Chemically Reacting Flow, 2003, section 11.5).
         """
         return None if self.sticking is None else np.asarray(self.sticking * self._activation(temperature))
+
+    @property
+    def changes(self) -> Mapping[str, float]:
+        """Signed amounts of all that an event changes: gas, sites and films."""
+        return {**self.nu_gas, **self.nu_site, **self.film}
 
     @property
     def reactants(self) -> tuple[str]:
@@ -174,6 +197,50 @@ class Mechanism:
         made = dict.fromkeys(name for reaction in reactions for name in reaction.product_sites)
         used = {reaction.site for reaction in reactions}
         return tuple(name for name in made if name not in used) or tuple(made)
+
+    @property
+    def reactions(self) -> tuple[SurfaceReaction | GasReaction, ...]:
+        """All reactions, those on the surface first."""
+        return (*self.surface_reactions, *self.gas_reactions)
+
+    def heat_of_reaction[Value: (float, Floats)](
+        self, reaction: SurfaceReaction | GasReaction, temperature: Value
+    ) -> Value:
+        """dH [J/mol of events as written] at `temperature` [K], negative where heat is set free.
+
+        What the reaction gives itself; else sum_i nu_i (h_i + c_i (T - 298.15 K)) over gas, sites and films (Hess, Kirchhoff). The heat
+        capacities c_i count where all of them are known: some of them alone would be an error of the size of those left out. 0 where no
+        enthalpy is known (`mpm check` says so); the case refuses some without the others.
+        """
+        constant, slope = self._heat(reaction)
+        return constant + slope * (temperature - STANDARD_TEMPERATURE)
+
+    def knows_heat(self, reaction: SurfaceReaction | GasReaction) -> bool:
+        """Whether the heat of a reaction is given or follows from enthalpies."""
+        return reaction.given_heat is not None or not self.without_enthalpy(reaction)
+
+    def without_enthalpy(self, reaction: SurfaceReaction | GasReaction) -> tuple[str, ...]:
+        """Names of what a reaction changes and of which no enthalpy is known."""
+        return tuple(name for name in reaction.changes if self._parts[name].enthalpy is None)
+
+    @cached_property
+    def _parts(self) -> dict[str, Species | Site]:
+        """Species, sites and films by name."""
+        return {
+            **{part.name: part for part in self.species},
+            **{part.name: part for part in (*self.sites, *self.films)},
+        }
+
+    def _heat(self, reaction: SurfaceReaction | GasReaction) -> tuple[float, float]:
+        """dH at 298.15 K [J/mol], and its slope [J/mol/K]."""
+        if reaction.given_heat is not None:
+            return reaction.given_heat, 0.0
+        if not self.knows_heat(reaction):
+            return 0.0, 0.0
+        parts = [(nu, self._parts[name]) for name, nu in reaction.changes.items()]
+        constant = sum(nu * part.enthalpy for nu, part in parts if part.enthalpy is not None)
+        slopes = [nu * part.heat_capacity for nu, part in parts if part.heat_capacity is not None]
+        return constant, sum(slopes) if len(slopes) == len(parts) else 0.0
 
     def get(self, name: str) -> Species:
         """The species called `name` (KeyError otherwise)."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
+
+from mpm.constants import GAS_CONSTANT
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,3 +34,22 @@ def kozeny_carman(*, porosity: float, surface_to_volume: float, constant: float)
     c0 = 5 for packed spheres (Carman 1937), 4.2 fitted for the glass beads of the thesis (table 5.4).
     """
     return porosity**3 / (constant * surface_to_volume**2)
+
+
+def slip_factor(free_path: float, pore_diameter: float) -> float:
+    """1 + b/p = 1 + 8 Kn, by which slip at the walls raises the permeability of pores of `pore_diameter` [m].
+
+    Klinkenberg 1941: b/p = 4 c l/r with c close to 1, Maxwell's slip in a capillary of radius r; `free_path` l is
+    `mpm.physics.fluidisation.mean_free_path`. 1 in a dense gas.
+    """
+    return 1.0 + 8.0 * free_path / pore_diameter
+
+
+def knudsen_diffusivity(pore_diameter: float, molar_mass: float, temperature: float) -> float:
+    """D_K = (d/3) sqrt(8 R T/(pi M)) [m2/s] of free molecules in a pore of diameter d [m]: Knudsen 1909."""
+    return pore_diameter / 3.0 * math.sqrt(8.0 * GAS_CONSTANT * temperature / (math.pi * molar_mass))
+
+
+def bosanquet(diffusivity: float, knudsen: float) -> float:
+    """1/D = 1/D_m + 1/D_K [m2/s]: collisions with molecules and with walls (Bosanquet; Pollard and Present 1948)."""
+    return diffusivity * knudsen / (diffusivity + knudsen)
