@@ -6,7 +6,8 @@ import pytest
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.parallel import total
-from mpm.transport.coverage import MEMORY, Coverage
+from mpm.transport.columns import MEMORY
+from mpm.transport.coverage import Coverage
 
 from .cases import MPI, TINY, zone
 

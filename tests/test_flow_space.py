@@ -10,6 +10,7 @@ from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.flow.convection import Convection
 from mpm.flow.fields import FlowField, boundary_flows, face_flow
+from mpm.flow.given import port_fields
 from mpm.flow.problem import FlowProblem
 from mpm.flow.space import FlowSpace
 from mpm.flow.steady import steady_flow
@@ -39,7 +40,7 @@ def swirling(space: FlowSpace, inflow: float = 1.0, turn: float = 1.7) -> Any:
     first, last = psi.getOwnershipRange()
     psi.array[:] = 1e-4 * np.sin(turn * np.arange(first, last) + 0.3)
     space.curl.mult(psi, field.x.petsc_vec)
-    field.x.array[: space.own] += inflow * space.ports()[0][: space.own]
+    field.x.array[: space.own] += inflow * port_fields(space)[0][: space.own]
     field.x.scatter_forward()
     return field
 

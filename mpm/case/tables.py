@@ -195,6 +195,10 @@ class CaseTables(Frozen):
         """
         return -1 if self.conveying_velocity < 0.0 else 1
 
+    def inlet_density(self, inlet: Inlet) -> float:
+        """Density of what an inlet blows over that of the gas at gas.temperature: 1 unless its temperature is another."""
+        return self.gas.temperature / self.inlet_temperature(inlet)
+
     # What inlets dose
 
     def feed_concentrations(self, mass_fractions: Mapping[str, float]) -> dict[str, float]:

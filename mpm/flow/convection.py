@@ -11,8 +11,9 @@ Tested with the functions v of the Raviart-Thomas elements of lowest order, with
     faces inside       (u.n) (w_ahead - w_behind) . {c v}            tangential parts, {} the mean of both sides
     walls, where u.n points inwards                 (c/eps) |u.n| u.v
 
-of one linear function of the fluxes with another one: N(u) = T (S u * D u), with three sparse matrices that are made once. Products come
-in pairs, one for each of the two functions v along the same pair of sides, with the same S u.
+(in gas of different densities c u is the mass flux over eps, what it carries the velocity) of one linear function of the fluxes with
+another one: N(u) = T (S u * D u), with three sparse matrices that are made once. Products come in pairs, one for each of the two functions
+v along the same pair of sides, with the same S u.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ MASS = np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]])
 
 
 class Convection:
-    """N(u) and its derivative for a gas of `density` [kg/m3] on the fluxes of `space`. All methods are collective.
+    """N(u) and its derivative for a gas of `density` [kg/m3], the case's own, on the fluxes of `space`. All methods are collective.
 
     What this rank knows are its own cells and the faces that it owns; `_force` adds up what neighbours know of a flux.
     """
@@ -151,12 +152,12 @@ class _Products:
         self.walls = slice(inside // 2, self.count // 2)
 
     def carriers(self) -> tuple[Ints, Ints, Floats]:
-        """S, one row per pair: what carries. In cells the difference of the two velocities, elsewhere the velocity through the face
-        (inwards at walls)."""
+        """S, one row per pair: what carries, the flux through the face (inwards at walls); in cells the difference of the two
+        velocities."""
         entries = _Entries(self.space, 1)
         for cells, sides, _ in self._cells:
-            entries.add(cells, self.space.dofs[cells, sides[0]], -1.0)
-            entries.add(cells, self.space.dofs[cells, sides[1]], 1.0)
+            entries.add(cells, self.space.dofs[cells, sides[0]], -1.0, velocity=True)
+            entries.add(cells, self.space.dofs[cells, sides[1]], 1.0, velocity=True)
             entries.next(len(cells))
         for behind, _, _, _, normal in self._faces:
             entries.add(np.arange(len(behind)), normal, 1.0)
@@ -167,7 +168,7 @@ class _Products:
         return entries.sorted()
 
     def carried(self) -> tuple[Ints, Ints, Floats]:
-        """D: what is carried, tested with either of the two functions: the velocity in cells and at walls, the jump of w at faces."""
+        """D: what is carried, tested with either of the two functions: the velocity at walls, the jump of w at faces; in cells the flux."""
         entries, dofs = _Entries(self.space, 2), self.space.dofs
         for cells, sides, _ in self._cells:
             for pair in (0, 1):
@@ -178,14 +179,14 @@ class _Products:
             place = np.arange(len(behind))
             for pair in (0, 1):
                 for k in (0, 1):
-                    entries.add(place, dofs[ahead, sides[k]], MASS[pair, k] / self._eps[ahead], pair)
-                    entries.add(place, dofs[behind, sides[k]], -MASS[pair, k] / self._eps[behind], pair)
+                    entries.add(place, dofs[ahead, sides[k]], MASS[pair, k] / self._eps[ahead], pair, True)
+                    entries.add(place, dofs[behind, sides[k]], -MASS[pair, k] / self._eps[behind], pair, True)
             entries.next(len(behind))
         for cells, side, _ in self._walls:
             place = np.arange(len(cells))
             for pair in (0, 1):
                 for k in (0, 1):
-                    entries.add(place, dofs[cells, ALONG[side][k]], MASS[pair, k], pair)
+                    entries.add(place, dofs[cells, ALONG[side][k]], MASS[pair, k], pair, True)
             entries.next(len(cells))
         return entries.sorted()
 
@@ -212,7 +213,8 @@ class _Products:
 
 
 class _Entries:
-    """Entries of a matrix that reads or tests velocities, in `each` (1, 2) rows for every place; a flux is its velocity times a weight."""
+    """Entries of a matrix that reads or tests flux densities, in `each` (1, 2) rows for every place; a flux is its density times a
+    weight."""
 
     def __init__(self, space: FlowSpace, each: int):
         self.space, self.each, self.first = space, each, 0
@@ -220,11 +222,16 @@ class _Entries:
         self.fluxes: list[Ints] = []
         self.values: list[Floats] = []
 
-    def add(self, place: Ints, fluxes: Ints, values: Floats | float, which: int = 0) -> None:
-        """In row number `which` of each `place` of this kind."""
+    def add(
+        self, place: Ints, fluxes: Ints, values: Floats | float, which: int = 0, velocity: bool = False
+    ) -> None:
+        """In row number `which` of each `place` of this kind; `velocity`: what counts is not the mass flux but that over the density."""
         self.products.append(self.first + self.each * place + which)
         self.fluxes.append(fluxes)
-        self.values.append(values / self.space.weights[fluxes])
+        per_flux = values / self.space.weights[fluxes]
+        if velocity and self.space.density is not None:
+            per_flux = per_flux / self.space.density[fluxes]
+        self.values.append(per_flux)
 
     def next(self, places: int) -> None:
         """Go on to the next kind, after one of so many places."""

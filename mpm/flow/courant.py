@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mpm.arrays import Floats
+from mpm.constants import GRAVITY
 from mpm.errors import ConvergenceError
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import Vibration
@@ -22,12 +23,15 @@ BOUND = 10.0  # times the speed that ports and motion give: no flow of a strip g
 def driving_speed(case: Case) -> float:
     """The speed that ports and motion give the gas [m/s]: the fastest port, or the reactor's swing with the bed's mean on top.
 
-    What the inlets feed, and what the swing displaces in the height of the strip, may have to leave through the narrowest outlet.
+    Hot gas in cold gas rises at up to sqrt(g H dT/T). What the inlets feed, and what the swing displaces in the height of the strip, may
+    have to leave through the narrowest outlet.
     """
     geometry, vibration = case.geometry, Vibration.from_motion(case.motion)
     swing = math.hypot(vibration.ax, vibration.ay) * vibration.omega
     moved = swing + abs(case.conveying_velocity)
-    fastest = max([moved, *(abs(inlet.velocity) + swing for inlet in geometry.inlets)])
+    low, high = case.temperatures[0], case.temperatures[-1]
+    rising = math.sqrt(GRAVITY * geometry.height * (high - low) / low)
+    fastest = max([moved, rising, *(abs(inlet.velocity) + swing for inlet in geometry.inlets)])
     if not geometry.outlets:
         return fastest
     volume = sum(abs(inlet.velocity) * inlet.width for inlet in geometry.inlets) + moved * geometry.height

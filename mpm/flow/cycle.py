@@ -47,18 +47,23 @@ def periodic_flow(
     bed_motion: BedMotion,
     phases: int,
     watch: Callable[[int, float], None] | None = None,
+    guess: FlowField | None = None,
+    kept: float | None = None,
 ) -> list[FlowField]:
     """The cycle that the flow repeats, one field per step; `problem.dt` is a cycle over `phases`.
 
-    Marches from the steady flow under the mean forcing. Summed over a periodic cycle of backward Euler the storage cancels, so the
-    cycle's mean satisfies the steady equations with the cycle's mean convection. What it lacks after a cycle, above all the slow start-up
-    drift of the headspace (about 0.7 s), a Newton step on those equations finds at once, where marching would take 100 cycles. Of that
-    mean error `_at_the_end` tells what is left at the end of the cycle, which then begins anew without it.
-    Periodicity is judged on velocities alone. `watch(cycle, change)` is called after every cycle. Raises ConvergenceError after
-    CYCLE_LIMIT cycles, or as soon as the flow diverges because its steps are too long.
+    Marches from a `guess` of its end, or from the steady flow under the mean forcing. Summed over a periodic cycle of backward Euler the
+    storage cancels, so the cycle's mean satisfies the steady equations with the cycle's mean convection. What it lacks after a cycle, above
+    all the slow start-up drift of the headspace (about 0.7 s), a Newton step on those equations finds at once, where marching would take
+    100 cycles. Of that mean error `_at_the_end` tells what is left at the end of the cycle, which then begins anew without it. A factor for
+    the step `kept` [s] is not released. Periodicity is judged on velocities alone. `watch(cycle, change)` is called after every cycle.
+    Raises ConvergenceError after CYCLE_LIMIT cycles, or as soon as the flow diverges because its steps are too long.
     """
     motions = cycle_motions(bed_motion, problem.dt, phases)
-    steady_flow(problem, mean_motion(bed_motion))
+    if guess is None or phases == 1:
+        steady_flow(problem, mean_motion(bed_motion), guess)
+    else:
+        problem.start_from(guess, (1.0, motions[-1].frame_velocity_y))
     if phases == 1:
         return [problem.field()]
     mean = StepMotion(
@@ -73,7 +78,7 @@ def periodic_flow(
         if watch is not None:
             watch(cycle, change)
         if change < PERIODIC:
-            problem.release()  # before the fields take their place
+            problem.release(kept)  # before the fields take their place
             return [FlowField(problem.space.velocities(fluxes), pressure) for fluxes, pressure in states]
         end, lacking = problem.values.copy(), np.zeros_like(problem.values)
         problem.values[:] = state_mean

@@ -13,6 +13,7 @@ from mpm.flow.convection import Convection
 from mpm.flow.space import FlowSpace
 from mpm.numerics.fem import PETSc
 from mpm.numerics.linear import ITERATIONS, DirectSolver, check
+from mpm.numerics.sparse import sparse_matrix
 
 
 class Jacobian:
@@ -52,3 +53,14 @@ class Jacobian:
             factor.ksp.setOperators(factor.matrix)
             ksp.destroy()
             matrix.destroy()
+
+
+def assembled_jacobian(
+    space: FlowSpace, creeping: PETSc.Mat, convection: Convection, values: Floats, share: float
+) -> PETSc.Mat:
+    """Z^T (A + dN/du) Z about the fluxes `values` as a matrix, with `creeping` = A and a `share` of the convection."""
+    rows, columns, entries = convection.slope_matrix(values)
+    whole = sparse_matrix(space.strip.comm, space.own, space.own, (rows, columns))
+    whole.setValuesCOO(share * entries)
+    whole.axpy(1.0, creeping)
+    return whole.ptap(space.curl)

@@ -4,10 +4,11 @@
     (rho/eps) (du/dt + u.grad(u/eps)) = -grad p + div(mu_e grad U) - (mu/K) (U - v_s) - rho a(t),   U = u + (1-eps) v_s
 
 `u` is the superficial gas velocity relative to the mesh [m/s], `v_s` the bed's velocity relative to the mesh and `a` the mesh's
-acceleration; gravity and the vertical acceleration are gradients and vanish into the pressure `p` [Pa]. `U`, the volume flux of gas and
-solids together, is continuous across the faces of the moving bed and as free of divergence as u: gas at the surface of the bed moves with
-v_s, pore gas is carried at eps v_s. Gas layers have eps = 1, 1/K = 0 and U = u. Walls are no-slip, ports prescribe the normal velocity,
-outlets have p = 0 and no tangential velocity gradient. Where a bed passes the closed ends of a strip, u = 0 there and U = (1-eps) v_s.
+acceleration; gravity and the vertical acceleration are gradients and vanish into the pressure `p` [Pa], but for gas that differs in
+density. `U`, the volume flux of gas and solids together, is continuous across the faces of the moving bed and as free of divergence as u:
+gas at the surface of the bed moves with v_s, pore gas is carried at eps v_s. Gas layers have eps = 1, 1/K = 0 and U = u. Walls are no-slip,
+ports prescribe the normal velocity, outlets have p = 0 and no tangential velocity gradient. Where a bed passes the closed ends of a strip,
+u = 0 there and U = (1-eps) v_s.
 
 Discretisation: Raviart-Thomas of lowest order on quadrilaterals, the marker-and-cell scheme written as forms; the flux through every facet
 is one number. div u = 0 holds by construction, because the unknowns are a stream function psi (`mpm.flow.space`). With A the matrix of
@@ -16,35 +17,37 @@ the state u, which is u_p once the flows of its ports are those of the step, is
 
     Z^T (A + M/dt) Z dpsi = Z^T (f - N(u) - A u_p - M (u_p - u)/dt),    u' = u_p + Z dpsi,
 
-symmetric and positive definite. Convection is explicit, so one factor serves all steps. What is solved for is a change, so that rounding is
-relative to that. The terms of the equation are the functions of `mpm.flow.terms`; this module assembles and solves.
+symmetric and positive definite. In gas of different temperatures (`mpm.flow.state`) the unknown is the mass flux, counted as a volume flux
+at the case's density: rho/rho_ref u in place of u, with the same constraint and u = D^-1 of it, D the density at the facets. A and M then
+become A D^-1 and M D^-1, which are no longer symmetric, the equation gains the weight (rho - rho_ref) (g + a_y), and what heating drives
+out of a cell, -eps d(rho/rho_ref)/dt, is in u_p. Convection is explicit, so one factor serves all steps. What is solved for is a change, so
+that rounding is relative to that. The terms of the equation are the functions of `mpm.flow.terms`; this module assembles and solves.
 """
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import ufl
-from ufl import Form
 
 from mpm.arrays import Floats
+from mpm.constants import GRAVITY
 from mpm.flow.convection import Convection
 from mpm.flow.fields import FlowField
-from mpm.flow.linearised import Jacobian
-from mpm.flow.space import CLOSED, FlowSpace
-from mpm.flow.terms import Medium, bed_entrainment, drag, frame_acceleration, inertia, viscosity
+from mpm.flow.forms import FlowForms
+from mpm.flow.given import port_fields, spreading
+from mpm.flow.linearised import Jacobian, assembled_jacobian
+from mpm.flow.space import FlowSpace
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import StepMotion
-from mpm.numerics.fem import PETSc, dolfinx
+from mpm.numerics.fem import PETSc
 from mpm.numerics.linear import DirectSolver
 from mpm.numerics.memory import give_back
-from mpm.numerics.sparse import sparse_matrix, thinned
 from mpm.parallel import largest
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
+    from mpm.flow.state import GasState
 
 STEADY = float("inf")  # s, the time step without inertia
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
@@ -59,46 +62,38 @@ class FlowProblem:
     same to 1e-12 at every run on as many ranks. `unbalanced` (own fluxes) is the force that the pressure must balance.
     """
 
-    def __init__(self, case: Case, strip: Strip, dt: float, refined: bool = False):
-        self.case, self.strip, self.dt, self.refined = case, strip, float(dt), refined
-        self.space = FlowSpace(case, strip)
+    def __init__(
+        self, case: Case, strip: Strip, dt: float, refined: bool = False, gas: GasState | None = None
+    ):
+        self.case, self.strip, self.dt, self.refined, self.gas = case, strip, float(dt), refined, gas
+        self.space = FlowSpace(case, strip, gas)
         self.state = self.space.function()
         self.convection_share = 1.0  # below 1 on the way to a fast flow
         self._matrices: dict[float, PETSc.Mat] = {}  # A + M/dt and the factors of its curls, by dt
         self._solvers: dict[float, DirectSolver] = {}
-        self._assemble()
+        self._forms = forms = FlowForms(case, strip, self.space, gas)
+        self.viscous = self._matrices[STEADY] = forms.viscous
+        self.convection = Convection(self.space, case.gas.density)
+        self.unbalanced, self._work = (self.viscous.createVecLeft() for _ in range(2))
+        self._psi, self._rhs = (self.space.curl.createVecRight() for _ in range(2))
+        give_back(strip.comm)  # what forms take while they are assembled is as much as a factor
         self._ports = CLOSED_PORTS  # of the state
-        self._port_fields = self.space.ports()
+        self._spread = 0.0 * self.values  # what the state carries of the gas that heating drives out
+        self._port_fields = port_fields(self.space)
         if self._port_fields[1].any():  # moved in every step: without forces that must cancel then
             self._port_fields = (self._port_fields[0], self._creeping(self._port_fields[1]))
 
-    def _assemble(self) -> None:
-        u, v = ufl.TrialFunction(self.space.fluxes), ufl.TestFunction(self.space.fluxes)
-        m = Medium.from_case(self.case, self.strip)
-        closed = ufl.Measure("ds", domain=self.strip.mesh, subdomain_data=self.space.facets)(CLOSED)
-        self.viscous = thinned(_matrix(viscosity(u, v, m, closed) + drag(u, v, m)))
-        self._matrices[STEADY] = self.viscous
-        solids = self.space.along_x(m.moving_solid)  # their volume flux per unit velocity of the bed
-        self.entrainment = _vector(bed_entrainment(solids, v, m, closed))
-        self.acceleration = _vector(frame_acceleration(v, m))
-        self.convection = Convection(self.space, m.density)
-        self.unbalanced, self._work = (self.viscous.createVecLeft() for _ in range(2))
-        self._psi, self._rhs = (self.space.curl.createVecRight() for _ in range(2))
-        give_back(self.strip.comm)  # what forms take while they are assembled is as much as a factor
-
-    @cached_property
+    @property
     def mass(self) -> PETSc.Mat:
         """M; a steady flow has no use for it."""
-        u, v = ufl.TrialFunction(self.space.fluxes), ufl.TestFunction(self.space.fluxes)
-        return thinned(_matrix(inertia(u, v, Medium.from_case(self.case, self.strip))))
+        return self._forms.mass
 
-    def release(self) -> None:
-        """Give the factors' memory back; they are made anew when needed again. Collective."""
+    def release(self, kept: float | None = None) -> None:
+        """Give the memory of all factors back but for one that is `kept`; they are made anew when needed again. Collective."""
         for dt in [dt for dt in self._matrices if dt != STEADY]:
             self._matrices.pop(dt).destroy()
-        for solver in self._solvers.values():
-            solver.destroy()
-        self._solvers.clear()
+        for dt in [dt for dt in self._solvers if dt != kept]:
+            self._solvers.pop(dt).destroy()
 
     def operator(self, dt: float) -> PETSc.Mat:
         """A + M/dt."""
@@ -111,8 +106,23 @@ class FlowProblem:
         """The factor of Z^T (A + M/dt) Z."""
         if dt not in self._solvers:
             reduced = self.operator(dt).ptap(self.space.curl)
-            self._solvers[dt] = DirectSolver(reduced, f"flow (step of {dt:.3g} s)", definite=True)
+            definite = self.space.density is None
+            self._solvers[dt] = DirectSolver(reduced, f"flow (step of {dt:.3g} s)", definite)
         return self._solvers[dt]
+
+    def lighter(self, gas: GasState) -> PETSc.Vec | None:
+        """Weight of `gas` less that of this problem's (own fluxes,), None where weight does not count; collective."""
+        if self._forms.weight is None:
+            return None
+        other = self._forms.weight_of(gas)
+        other.axpy(-1.0, self._forms.weight)
+        other.scale(GRAVITY)
+        return other
+
+    def weigh_as(self, gas: GasState) -> None:
+        """Let the weight be that of `gas` from now on; collective."""
+        if self._forms.weight is not None:
+            self._forms.weight = self._forms.weight_of(gas)
 
     # --- solving ---
 
@@ -122,21 +132,40 @@ class FlowProblem:
         force.scale(self.convection_share)
         return force
 
-    def step(self, motion: StepMotion, convective: PETSc.Vec | None = None) -> None:
-        """Advance the state by one backward Euler step under the step's mean forcing; convection is taken at the old state."""
+    def step(
+        self, motion: StepMotion, convective: PETSc.Vec | None = None, source: Floats | None = None
+    ) -> None:
+        """Advance the state by one backward Euler step under the step's mean forcing; convection is taken at the old state.
+
+        `source` (own cells,) [m2/s]: what heating drives out of each cell.
+        """
         convective = convective if convective is not None else self.convective_force()
         moved = self._move_ports(motion)
+        if source is not None:
+            more = spreading(self.space, source) - self._spread
+            self._spread = self._spread + more
+            self.values[:] += more
+            moved = more if moved is None else moved + more
         self.weigh(motion, convective)
         if moved is not None:
             self._work.array[:] = moved[: self.space.own] / self.dt
             self.mass.multAdd(self._work, self.unbalanced, self.unbalanced)
-        self._balance(self.dt)
+        self._balance(self.dt, passes=1 + self.refined)
 
     def solve_steady(self, motion: StepMotion, convective: PETSc.Vec) -> None:
         """Set the state to the steady solution under `motion` with a given convective force."""
         self._move_ports(motion)
         self.weigh(motion, convective)
-        self._balance(STEADY, passes=2)
+        self._balance(STEADY, passes=2 + self.refined)
+
+    def driven(self, source: Floats | None, weight: PETSc.Vec | None) -> Floats:
+        """The creeping flow, ports closed, of what heating drives out of own cells, `source` (own,) [m2/s], and of a `weight` (own
+        fluxes,); (local fluxes,), collective. The state is not changed."""
+        state, unbalanced = self.values.copy(), self.unbalanced.array.copy()
+        given = 0.0 * self.values if source is None else spreading(self.space, source)
+        found = self._creeping(given, weight, passes=1)
+        self.values[:], self.unbalanced.array[:] = state, unbalanced
+        return found
 
     def _move_ports(self, motion: StepMotion) -> Floats | None:
         """Give the state the port flows of a step; returns its change (local fluxes,), None without any."""
@@ -149,11 +178,13 @@ class FlowProblem:
         self._ports = wanted
         return np.asarray(moved)
 
-    def _creeping(self, values: Floats) -> Floats:
-        """The flow with the same ports as the fluxes `values`, but without inertia and forces."""
+    def _creeping(self, values: Floats, force: PETSc.Vec | None = None, passes: int | None = None) -> Floats:
+        """The flow with the same ports and sources as the fluxes `values`, without inertia, under this `force` alone."""
         self.values[:] = values
         self.viscous.mult(self.state.x.petsc_vec, self.unbalanced)
-        self._balance(STEADY, passes=2)
+        if force is not None:
+            self.unbalanced.axpy(-1.0, force)
+        self._balance(STEADY, passes or 2 + self.refined)
         found = self.values.copy()
         self.values[:] = 0.0
         return found
@@ -165,8 +196,10 @@ class FlowProblem:
         """
         residual = self.unbalanced
         self.viscous.mult(self.state.x.petsc_vec, residual)
-        residual.axpy(-motion.bed_velocity, self.entrainment)
-        residual.axpy(-motion.acceleration, self.acceleration)
+        residual.axpy(-motion.bed_velocity, self._forms.entrainment)
+        residual.axpy(-motion.acceleration, self._forms.acceleration)
+        if self._forms.weight is not None:
+            residual.axpy(-(GRAVITY + motion.acceleration_y), self._forms.weight)
         force = self.convective_force() if convective is None else convective
         residual.array[:] += force.array[: self.space.own]
 
@@ -174,7 +207,7 @@ class FlowProblem:
         """Change the state so that `unbalanced` has no curl; it is kept up to date."""
         if self._psi.size == 0:
             return  # walls all around a cell
-        for _ in range(passes + self.refined):
+        for _ in range(passes):
             self.space.curl.multTranspose(self.unbalanced, self._rhs)
             self._solver(dt).solve(self._rhs, self._psi)
             self._adopt()
@@ -204,7 +237,9 @@ class FlowProblem:
             return 0.0
         self.space.curl.multTranspose(self.unbalanced, self._rhs)
         if exact:
-            solver = DirectSolver(self._exact_jacobian(), "flow (Newton)")
+            share = self.convection_share
+            matrix = assembled_jacobian(self.space, self.viscous, self.convection, self.values, share)
+            solver = DirectSolver(matrix, "flow (Newton)")
             solver.solve(self._rhs, self._psi)
             solver.destroy()
         else:
@@ -213,14 +248,6 @@ class FlowProblem:
         change = self.space.fastest(self._work.array)
         change, fastest = largest(self.strip.comm, [change, self.space.fastest(self.values)])
         return float(change / fastest) if fastest > 0.0 else 0.0
-
-    def _exact_jacobian(self) -> PETSc.Mat:
-        """Z^T (A + dN/du) Z at the present state."""
-        rows, columns, values = self.convection.slope_matrix(self.values)
-        whole = sparse_matrix(self.strip.comm, self.space.own, self.space.own, (rows, columns))
-        whole.setValuesCOO(self.convection_share * values)
-        whole.axpy(1.0, self.viscous)
-        return whole.ptap(self.space.curl)
 
     def decayed(self, change: Floats, time: float, tolerance: float) -> Floats:
         """What is left of a `change` of the flow (local fluxes,), ports closed, after an implicit step of `time` [s]; collective.
@@ -262,19 +289,9 @@ class FlowProblem:
         """The present state as a velocity field, with the pressure of the step just made; a copy. Collective."""
         return FlowField(self.space.velocities(self.values), self.pressure())
 
-    def start_from(self, field: FlowField, ports: PortState) -> None:
-        """Make `field`, whose `ports` these are, the present state."""
+    def start_from(self, field: FlowField, ports: PortState, source: Floats | None = None) -> None:
+        """Make `field`, whose `ports` and `source` (own cells,) [m2/s] these are, the present state."""
         self.values[:] = self.space.from_velocities(field.velocities)
         self._ports = ports
-
-
-def _matrix(form: Form) -> PETSc.Mat:
-    matrix = dolfinx.fem.petsc.assemble_matrix(dolfinx.fem.form(form))
-    matrix.assemble()
-    return matrix
-
-
-def _vector(form: Form) -> PETSc.Vec:
-    vector = dolfinx.fem.petsc.assemble_vector(dolfinx.fem.form(form))
-    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-    return vector
+        if source is not None:
+            self._spread = spreading(self.space, source)

@@ -12,7 +12,7 @@ from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
 from mpm.flow.cycle import mean_motion, periodic_flow
 from mpm.flow.fields import FlowField, mean_field
-from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
+from mpm.flow.problem import CLOSED_PORTS, STEADY, FlowProblem, PortState
 from mpm.flow.steady import steady_flow
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
@@ -37,9 +37,6 @@ class FlowSequence(Protocol):
     def mean(self) -> FlowField:
         """Mean over the cycle, over the last one where they differ."""
 
-    def stored(self, own: int) -> Floats:
-        """Everything needed to go on, (fields, 5, own cells): four velocities and the pressure of each field."""
-
 
 def begins_at_rest(case: Case, schedule: Schedule) -> bool:
     """Whether there are steps before the vibration starts, which have a field of their own; the steady state has no beginning."""
@@ -62,13 +59,29 @@ class CyclicFlow:
         Raises ConvergenceError.
         """
         problem = FlowProblem(case, strip, schedule.dt)
-        at_rest = steady_flow(problem) if begins_at_rest(case, schedule) else None
-        if case.fidelity == "resolved":
-            phases = periodic_flow(problem, bed_motion, schedule.phases, watch)
-        else:
-            phases = [steady_flow(problem, mean_motion(bed_motion))]
+        found = cls.found(problem, bed_motion, schedule, watch)
         problem.release()
-        return cls(at_rest, phases)
+        return found
+
+    @classmethod
+    def found(
+        cls,
+        problem: FlowProblem,
+        bed_motion: BedMotion,
+        schedule: Schedule,
+        watch: Watch | None = None,
+        guess: CyclicFlow | None = None,
+    ) -> CyclicFlow:
+        """The same of a problem that is there and keeps its steady factor, starting from a similar flow as a `guess`.
+
+        A guess without a field at rest asks for none. Raises ConvergenceError.
+        """
+        case, at_rest, last = problem.case, None, None if guess is None else guess.phases[-1]
+        if begins_at_rest(case, schedule) and (guess is None or guess.at_rest is not None):
+            at_rest = steady_flow(problem, guess=None if guess is None else guess.at_rest)
+        if case.fidelity == "resolved":
+            return cls(at_rest, periodic_flow(problem, bed_motion, schedule.phases, watch, last, STEADY))
+        return cls(at_rest, [steady_flow(problem, mean_motion(bed_motion), last)])
 
     def at(self, step: Step) -> FlowField:
         """The field of the step's phase."""

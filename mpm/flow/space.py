@@ -3,9 +3,10 @@
 The flux through every facet is one number, that of Raviart-Thomas elements of lowest order on quadrilaterals. Fields with div u = 0 and the
 prescribed flow through walls and inlets are u = u_p + Z psi: `u_p` is any one of them, psi a stream function on the vertices of the grid
 [m2/s], Z its discrete curl, u_x = dpsi/dy and u_y = -dpsi/dx, whose entries are +-1 (Chorin's null-space method; as exact as the grid is,
-whatever psi). Along a wall psi is one number, because nothing flows through; vertices within an outlet have their own. What flows up
-through a whole periodic strip, from outlets of one side to those of the other, has no psi that is the same after a turn: its amount is
-an unknown of its own. The pressure is not an unknown: it follows from the forces that a solution leaves on each facet.
+whatever psi). Gas that is not everywhere equally hot has a mass flux in place of u, counted as a volume flux at the density of `[gas]`.
+Along a wall psi is one number, because nothing flows through; vertices within an outlet have their own. What flows up through a whole
+periodic strip, from outlets of one side to those of the other, has no psi that is the same after a turn: its amount is an unknown of its
+own. The pressure is not an unknown: it follows from the forces that a solution leaves on each facet.
 """
 
 from __future__ import annotations
@@ -16,16 +17,15 @@ import basix.ufl
 import numpy as np
 
 from mpm.arrays import Floats, Ints
-from mpm.errors import InputError
 from mpm.mesh.strip import BOTTOM, LEFT, RIGHT, TOP, Strip
 from mpm.numerics.fem import PETSc, dolfinx
 from mpm.numerics.sparse import sparse_matrix
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
+    from mpm.flow.state import GasState
 
 CLOSED, OPEN = 1, 2  # facet markers: walls and inlets, outlets
-ROUNDING = 1e-12  # of what flows through a wall: inlets that gain no more than this are in balance
 
 
 class FlowSpace:
@@ -33,10 +33,11 @@ class FlowSpace:
 
     `own` is the number of own fluxes; `dofs` (local cells, 4) those of each cell's bottom, left, right and top; `weights` (local fluxes,)
     the flux per unit velocity along the axes: a facet's length, with the sign of the element's orientation. `facets` are the markers CLOSED
-    and OPEN of the boundary, `curl` is Z.
+    and OPEN of the boundary, `curl` is Z. `density` (local fluxes,) is that of the gas at the facets over that of the case, None where it
+    is 1 everywhere.
     """
 
-    def __init__(self, case: Case, strip: Strip):
+    def __init__(self, case: Case, strip: Strip, gas: GasState | None = None):
         self.case, self.strip = case, strip
         element = basix.ufl.element("RTCF", "quadrilateral", 1)
         self.fluxes = dolfinx.fem.functionspace(strip.mesh, element)
@@ -47,6 +48,27 @@ class FlowSpace:
         self.weights: Floats = ones.x.array
         self.facets = self._markers()
         self.curl = _curl(self, StreamFunction(case, strip))
+        self.density = None if gas is None else self._facet_density(gas)
+
+    def _facet_density(self, gas: GasState) -> Floats:
+        """Mean of the cells on both sides; through an inlet that of what it blows."""
+        there = np.bincount(self.dofs.ravel(), minlength=len(self.weights))
+        sums = np.bincount(self.dofs.ravel(), np.repeat(gas.relative, 4), len(self.weights))
+        mean = self.function()
+        mean.x.array[:] = sums / there
+        grid, strip = self.strip.grid, self.strip
+        for side, facet in (("bottom", BOTTOM), ("top", TOP)):
+            inlets = [inlet for inlet in self.case.geometry.inlets if inlet.side == side]
+            volume = sum((grid.overlap(i) * i.velocity for i in inlets), np.zeros(grid.columns))
+            mass = sum(
+                (grid.overlap(i) * i.velocity * self.case.inlet_density(i) for i in inlets), 0.0 * volume
+            )
+            cells = strip.wall_cells(side)
+            blown = np.flatnonzero(volume[strip.column[cells]] > 0.0)
+            columns = strip.column[cells[blown]]
+            mean.x.array[self.dofs[cells[blown], facet]] = mass[columns] / volume[columns]
+        mean.x.scatter_forward()
+        return np.array(mean.x.array)
 
     def _markers(self) -> dolfinx.mesh.MeshTags:
         """Facets of the boundary marked closed or open."""
@@ -78,48 +100,6 @@ class FlowSpace:
             field.x.array[dofs] = self.weights[dofs] * cell_values[inside]
         field.x.scatter_forward()
         return field
-
-    def ports(self) -> tuple[Floats, Floats]:
-        """Fields u_p (local fluxes,): with the inlets' velocities, and per unit vertical velocity of the frame.
-
-        Inlets that stay in the lab's frame see the mesh move past: their velocity relative to it is v - V_y. Raises InputError where such
-        inlets have nowhere to pass their gas on.
-        """
-        inlets, lab = self.case.geometry.inlets, self.case.motion.inlet_frame == "lab"
-        steady = self._through([i.velocity if i.side == "bottom" else -i.velocity for i in inlets])
-        return steady, self._through([-1.0 if lab else 0.0 for _ in inlets])
-
-    def _through(self, upwards: list[float]) -> Floats:
-        """A field without divergence for these upward velocities in the inlets [m/s]; outlets share what must leave.
-
-        Between the walls u_y changes linearly; u_x, the same in all rows, carries what this leaves.
-        """
-        grid, geometry = self.strip.grid, self.case.geometry
-        wall = {side: np.zeros(grid.columns) for side in ("bottom", "top")}  # upward velocities
-        for inlet, velocity in zip(geometry.inlets, upwards, strict=True):
-            wall[inlet.side] += grid.overlap(inlet) / grid.dx * velocity
-        gained = wall["bottom"].sum() - wall["top"].sum()
-        open_columns = [(o.side, grid.opening(o)) for o in geometry.outlets]
-        count = sum(int(opening.sum()) for _, opening in open_columns)
-        if not count and abs(gained) > ROUNDING * np.abs(wall["bottom"]).sum():
-            raise InputError(
-                "motion.inlet_frame: found inlets that stay in the lab's frame, and no outlet for what the moving reactor takes in; "
-                "accepted: at least one outlet"
-            )
-        for side, opening in open_columns:
-            wall[side][opening] += (1.0 if side == "top" else -1.0) * gained / count
-        level = (grid.y - grid.y[0]) / grid.height
-        along = np.concatenate([[0.0], np.cumsum((wall["bottom"] - wall["top"]) * grid.dx / grid.height)])
-        strip = self.strip
-        row, column = strip.row, strip.column
-        field = np.zeros(len(self.weights))
-        for facet, at in ((BOTTOM, level[row]), (TOP, level[row + 1])):
-            upward = (1.0 - at) * wall["bottom"][column] + at * wall["top"][column]
-            field[self.dofs[:, facet]] = upward
-        field[self.dofs[:, LEFT]], field[self.dofs[:, RIGHT]] = along[column], along[column + 1]
-        if grid.periodic:
-            field[self.dofs[column == grid.columns - 1, RIGHT]] = 0.0
-        return field * self.weights
 
     # --- looking at vectors of fluxes ---
 

@@ -21,13 +21,17 @@ SHARE_LIMIT = 12  # and from a flow with less convection
 FIRST_SHARE, LEAST_SHARE = 0.25, 1.0 / 64.0  # steps of the share of convection
 
 
-def steady_flow(problem: FlowProblem, motion: StepMotion = REST) -> FlowField:
+def steady_flow(problem: FlowProblem, motion: StepMotion = REST, guess: FlowField | None = None) -> FlowField:
     """Steady flow with convection under constant forcing; leaves it in `problem`.
 
-    Newton's method from the creeping flow, with the factored creeping operator as preconditioner, so that one factor serves. Where that
-    does not arrive (ports at a Reynolds number of a hundred), the convection grows in steps. Raises ConvergenceError.
+    Newton's method from a `guess` with the same ports, or from the creeping flow, with the factored creeping operator as preconditioner, so
+    that one factor serves. Where that does not arrive (ports at a Reynolds number of a hundred), the convection grows in steps. Raises
+    ConvergenceError.
     """
-    _creep(problem, motion)
+    if guess is None:
+        _creep(problem, motion)
+    else:
+        problem.start_from(guess, (1.0, motion.frame_velocity_y))
     try:
         _newton(problem, motion, LIMIT)
     except ConvergenceError:

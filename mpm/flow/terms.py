@@ -22,20 +22,23 @@ from mpm.numerics.fem import dolfinx
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.materials import Material
+    from mpm.flow.state import GasState
 
 Expr = Any  # of UFL, which has no types
 
 
 @dataclass(frozen=True)
 class Medium:
-    """What the gas flows through, as cell functions: density and viscosity are those of the carrier [SI].
+    """The gas and what it flows through, as cell functions: `density` is that of the carrier [SI], `buoyant` what it has more than the
+    case's own, whose weight the pressure does not count.
 
     `porosity` eps, `viscosity` mu_e, `resistance_x`, `resistance_y` mu/K [Pa s/m2], `moving_solid` 1 - eps in the moving layer and 0
     elsewhere, `width` of the cells [m], `half_height` [m]: from a cell's centre to its bottom and top as shear feels it (see
     `shear_distance`).
     """
 
-    density: float
+    density: float | dolfinx.fem.Function
+    buoyant: dolfinx.fem.Function | None
     porosity: dolfinx.fem.Function
     viscosity: dolfinx.fem.Function
     resistance_x: dolfinx.fem.Function
@@ -45,20 +48,27 @@ class Medium:
     half_height: dolfinx.fem.Function
 
     @classmethod
-    def from_case(cls, case: Case, strip: Strip) -> Medium:
-        """The medium at the gas's own viscosity and density."""
-        grid, mu = strip.grid, case.gas.viscosity
+    def from_case(cls, case: Case, strip: Strip, gas: GasState | None = None) -> Medium:
+        """The medium at the viscosity and density of the case, or in the state `gas` of its cells."""
+        grid, row = strip.grid, strip.row
+        mu = case.gas.viscosity if gas is None else gas.viscosity
         porosity = grid.per_row(lambda solid: solid.porosity, gas=1.0)
-        rows = {
-            "porosity": porosity,
-            "viscosity": grid.per_row(lambda solid: mu * solid.viscosity_ratio, gas=mu),
-            "resistance_x": grid.per_row(lambda solid: mu / solid.permeability[0], gas=0.0),
-            "resistance_y": grid.per_row(lambda solid: mu / solid.permeability[1], gas=0.0),
-            "moving_solid": np.where(grid.moving, 1.0 - porosity, 0.0),
-            "half_height": shear_distance(grid.dy, grid.per_row(brinkman_length, gas=np.inf)),
+        along = grid.per_row(lambda solid: solid.permeability[0], gas=np.inf)
+        through = grid.per_row(lambda solid: solid.permeability[1], gas=np.inf)
+        cells = {
+            "porosity": porosity[row],
+            "viscosity": mu * grid.per_row(lambda solid: solid.viscosity_ratio, gas=1.0)[row],
+            "resistance_x": mu / along[row],
+            "resistance_y": mu / through[row],
+            "moving_solid": np.where(grid.moving, 1.0 - porosity, 0.0)[row],
+            "half_height": shear_distance(grid.dy, grid.per_row(brinkman_length, gas=np.inf))[row],
         }
-        functions = {name: strip.cell_function(values, name) for name, values in rows.items()}
-        return cls(density=case.gas.density, width=grid.dx, **functions)
+        functions = {name: strip.cell_values(values, name) for name, values in cells.items()}
+        if gas is None:
+            return cls(density=case.gas.density, buoyant=None, width=grid.dx, **functions)
+        density = strip.cell_values(gas.reference * gas.relative, "density")
+        buoyant = strip.cell_values(gas.buoyant, "buoyant")
+        return cls(density=density, buoyant=buoyant, width=grid.dx, **functions)
 
 
 def brinkman_length(solid: Material) -> float:
@@ -120,5 +130,10 @@ def bed_entrainment(solids: Expr, v: Expr, m: Medium, closed: ufl.Measure) -> Fo
 
 
 def frame_acceleration(v: Expr, m: Medium) -> Form:
-    """Right-hand side per unit acceleration of the frame: -rho a_x."""
+    """Right-hand side per unit acceleration of the frame along x: -rho a_x. All of rho drives a periodic strip."""
     return -m.density * v[0] * dx
+
+
+def weight(v: Expr, buoyant: Expr) -> Form:
+    """Right-hand side per unit of gravity and upward acceleration of the frame: -(rho - rho_ref) (g + a_y), where density differs."""
+    return -buoyant * v[1] * dx

@@ -112,11 +112,10 @@ class Strip:
         last = np.flatnonzero(self.column[: self.owned] == self.grid.columns - 1)
         return np.concatenate([self.facets[first, LEFT], self.facets[last, RIGHT]])
 
-    def cell_function(self, per_row: Floats, name: str) -> dolfinx.fem.Function:
-        """A DG0 function whose value depends on the row alone."""
+    def cell_values(self, values: Floats, name: str) -> dolfinx.fem.Function:
+        """A DG0 function with these `values` in the local cells."""
         function = dolfinx.fem.Function(dolfinx.fem.functionspace(self.mesh, ("DG", 0)), name=name)
-        dofs = function.function_space.dofmap.list[:, 0]
-        function.x.array[dofs] = np.asarray(per_row)[self.row]
+        function.x.array[function.function_space.dofmap.list[:, 0]] = values
         return function
 
 

@@ -163,10 +163,11 @@ class BedMotion:
 
 @dataclass(frozen=True, kw_only=True)
 class StepMotion:
-    """Means over one time step: bed velocity relative to the mesh, frame acceleration a_x, frame velocity V_y; slide = distance."""
+    """Means over one time step: bed velocity relative to the mesh, frame acceleration a_x and a_y, frame velocity V_y; slide = distance."""
 
     bed_velocity: float = 0.0
     acceleration: float = 0.0
+    acceleration_y: float = 0.0
     frame_velocity_y: float = 0.0
     slide: float = 0.0
 
@@ -181,9 +182,11 @@ def step_motion(bed: BedMotion, t0: float, t1: float) -> StepMotion:
     dt = t1 - t0
     vibration = bed.vibration
     slide = bed.at(t1) - bed.at(t0)
+    after, before = vibration.velocity(t1), vibration.velocity(t0)
     return StepMotion(
         bed_velocity=slide / dt,
-        acceleration=(vibration.velocity(t1)[0] - vibration.velocity(t0)[0]) / dt,
+        acceleration=(after[0] - before[0]) / dt,
+        acceleration_y=(after[1] - before[1]) / dt,
         frame_velocity_y=(vibration.displacement(t1)[1] - vibration.displacement(t0)[1]) / dt,
         slide=slide,
     )

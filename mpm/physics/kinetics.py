@@ -55,14 +55,18 @@ class SurfaceKinetics:
         self.reactions = mechanism.running_surface(coupled)
         self.gas = [coupled.index(r.gas) for r in self.reactions]
         self.site = [names.index(r.site) for r in self.reactions]
-        molar_mass = {s.name: s.molar_mass for s in mechanism.species}
-        t = np.broadcast_to(np.asarray(temperature, dtype=float), sites.shape)
-        self.constant = [
-            np.asarray(r.rate_constant(t, molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions
-        ]
+        self._molar_mass = {s.name: s.molar_mass for s in mechanism.species}
+        self.heat_to(temperature)
         self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
             -1, len(names)
         )
+
+    def heat_to(self, temperature: ArrayLike) -> None:
+        """Take the rate constants at another temperature [K], scalar or per cell."""
+        t = np.broadcast_to(np.asarray(temperature, dtype=float), self.sites.shape)
+        self.constant = [
+            np.asarray(r.rate_constant(t, self._molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions
+        ]
 
     def part(self, chosen: NDArray[np.integer]) -> SurfaceKinetics:
         """The same reactions in some of the cells."""
@@ -214,8 +218,18 @@ class GasKinetics:
 
     def __init__(self, mechanism: Mechanism, coupled: tuple[str, ...], temperature: ArrayLike):
         self.reactions = mechanism.running_gas(coupled)
-        self.constant = [r.rate_constant(np.asarray(temperature, dtype=float)) for r in self.reactions]
+        self.heat_to(temperature)
         self.pairs = [(coupled.index(a), coupled.index(b)) for a, b in (r.reactants for r in self.reactions)]
+
+    def heat_to(self, temperature: ArrayLike) -> None:
+        """Take the rate constants at another temperature [K], scalar or per cell."""
+        self.constant = [r.rate_constant(np.asarray(temperature, dtype=float)) for r in self.reactions]
+
+    def part(self, chosen: NDArray[np.integer]) -> GasKinetics:
+        """The same reactions in some of the cells."""
+        other = copy.copy(self)
+        other.constant = [k[chosen] if k.ndim else k for k in self.constant]
+        return other
 
     def rates(self, concentration: Floats) -> tuple[Floats, Floats]:
         """Rates (reactions, n) and derivatives (reactions, coupled, n); negative concentrations count as none."""

@@ -68,9 +68,9 @@ def taken_over(flow: Flow, case: Case, strip: Strip, schedule: Schedule) -> Flow
 
     Collective.
     """
-    if isinstance(flow.sequence, MarchedFlow):
+    if case.energy is not None or not isinstance(flow.sequence, CyclicFlow):
         raise InputError(
-            "flow: found a transient, which belongs to one run; accepted: the flow of a developed run"
+            "flow: found a transient, which belongs to one run; accepted: the flow of a developed run without heat"
         )
     for name, wanted in conditions(case, schedule).items():
         if flow.conditions[name] != wanted:

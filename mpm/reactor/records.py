@@ -35,6 +35,7 @@ def totals(system: System) -> Totals:
         sites=total(comm, coverage.content()),
         sites_initially=system.sites_initially,
         sites_passed=coverage.passed,
+        heat=None if system.thermal is None else system.thermal.totals(),
     )
 
 
@@ -52,7 +53,16 @@ def state(system: System) -> State:
         cvd=total(comm, per_zone),
         cvd_max=float(largest(comm, [rate.max(initial=0.0)])[0]),
         concentration={transport.names[i]: field for i, field in zip(dosed, fields, strict=True)},
+        temperature=_temperature(system),
     )
+
+
+def _temperature(system: System) -> Floats | None:
+    """Of gas and solids, (rows, columns) [K] on every rank."""
+    if system.thermal is None:
+        return None
+    grid = system.grid
+    return system.strip.scatter.to_all(system.thermal.heat.temperature).reshape(grid.rows, grid.columns)
 
 
 def _zones(system: System) -> NDArray[np.int64]:
@@ -74,7 +84,9 @@ def local_fields(system: System) -> dict[str, Floats]:
     velocity = system.velocity
     concentration = dict(zip(transport.names, transport.concentration, strict=True))
     fields: dict[str, Floats] = {}
-    whole = case.gas.molar_density
+    warm = system.thermal
+    relative = np.ones(own) if warm is None else warm.gas.relative[:own]  # density over that of the case
+    whole = case.gas.molar_density * relative
     carrier = np.ones(own)
     for name in case.mechanism.species_names:
         c = concentration.get(name, np.zeros(own))
@@ -85,8 +97,11 @@ def local_fields(system: System) -> dict[str, Floats]:
         fields[f"theta_{site}"] = np.zeros(own)
         fields[f"theta_{site}"][coverage.cells] = coverage.theta[k]
     fields["cvd_rate"] = cvd_rate(system)
-    fields["velocity_x"], fields["velocity_y"] = velocity.in_cells(own)
+    fields["velocity_x"], fields["velocity_y"] = velocity.in_cells(own) / relative
     fields["pressure"] = velocity.pressure[:own]
+    if warm is not None:
+        fields["temperature"] = warm.heat.temperature
+        fields["density"] = warm.gas.reference * relative
     return fields
 
 

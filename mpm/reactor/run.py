@@ -13,7 +13,7 @@ from mpm.output.directory import FAILED
 from mpm.parallel import is_root, largest
 from mpm.reactor.progress import FLOW, Progress, log_file
 from mpm.reactor.records import totals
-from mpm.reactor.steady.solver import steady_problem
+from mpm.reactor.steady.thermal import steady_problem
 from mpm.reactor.summary import summarise
 from mpm.report.balances import LIMIT, require_balance, worst_balance
 from mpm.signals import stop_signals

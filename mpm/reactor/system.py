@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from mpm.arrays import Floats
@@ -14,8 +15,9 @@ from mpm.numerics import fem
 from mpm.numerics.memory import give_back
 from mpm.parallel import on_root, total
 from mpm.reactor.flow import Flow, conditions, dispersed, dispersion_conditions, find_flow, taken_over
-from mpm.transport.coverage import Coverage
-from mpm.transport.species import Operators, Transport
+from mpm.reactor.thermal import Thermal, ThermalMemento
+from mpm.transport.coverage import Coverage, Memento
+from mpm.transport.species import Operators, Transport, TransportMemento
 
 from mpi4py import MPI  # isort: skip  (after fem)
 
@@ -27,7 +29,8 @@ if TYPE_CHECKING:
 class System:
     """One case on the ranks of `comm`; all methods that look at it or change it are collective.
 
-    `sites_initially` (site species,) and `stored_initially` (species,) [mol/m] are what balances count from.
+    `thermal` is there with `[energy]`. `sites_initially` (site species,) and `stored_initially` (species,) [mol/m] are what balances count
+    from.
     """
 
     def __init__(self, case: Case, comm: MPI.Comm):
@@ -39,6 +42,9 @@ class System:
         self.bed_motion = BedMotion(case.motion)
         self.coverage = Coverage(case, self.strip)
         self.transport = Transport(case, self.strip, self.coverage)
+        self.thermal: Thermal | None = None
+        if case.energy is not None:
+            self.thermal = Thermal(case, self.strip, self.bed_motion, self.schedule, self.transport)
         self._flow: Flow | None = None
         self._operators: dict[FlowField, Operators] = {}
         self.count_from_here()
@@ -47,6 +53,8 @@ class System:
         """Let balances count from the present contents."""
         self.sites_initially = total(self.comm, self.coverage.content())
         self.stored_initially = self.stored_gas()
+        if self.thermal is not None:
+            self.thermal.count_from_here()
 
     def stored_gas(self) -> Floats:
         """What the gas holds of each species, (species,) [mol/m]."""
@@ -72,7 +80,10 @@ class System:
         `watch(cycle, change)` is called meanwhile. Raises ConvergenceError, and InputError for a flow that is not this case's.
         """
         case, strip, motion = self.case, self.strip, self.bed_motion
-        if known is None:
+        if self.thermal is not None and known is None:
+            self.thermal.find_flow(watch)
+            known = Flow(self.thermal.flow, strip.cell, conditions(case, self.schedule))
+        elif known is None:
             known = find_flow(case, strip, motion, self.schedule, watch)
         else:
             known = taken_over(known, case, strip, self.schedule)
@@ -96,29 +107,49 @@ class System:
     def operators(self, velocity: FlowField, at_rest: bool = False) -> Operators:
         """The species' operators in a velocity field; those of a cycle that repeats are kept."""
         if velocity not in self._operators:
-            if isinstance(self.flow.sequence, MarchedFlow):
+            if not self.recurring:
                 self._operators.clear()  # no field comes again
             self._operators[velocity] = self.transport.operators(velocity, at_rest)
         return self._operators[velocity]
 
+    @property
+    def recurring(self) -> bool:
+        """Whether the fields of the flow come again: those of a cycle, while no temperature changes them."""
+        if isinstance(self.flow.sequence, MarchedFlow):
+            return False
+        return self.thermal is None or not self.thermal.flow.changed
+
     # --- one step ---
 
     def advance(self, step: Step) -> None:
-        """One step: the gas moves, the bed slides, then species and coverage follow over the new position.
+        """One step: the gas moves, the bed slides, then species and coverage follow over the new position, and heat where there is any.
 
         Raises ConvergenceError; everything but the flow is then as before.
         """
-        before = self.coverage.memento()
+        before, warm = self._memento(), self.thermal
         try:
-            velocity = self.flow.sequence.at(step)
-            self.coverage.slide(self._slide(step))
+            columns = self.coverage.slide(self._slide(step))
+            velocity = self.flow.sequence.at(step) if warm is None else warm.begin(step, columns)
             operators = self.operators(velocity, step.phase == RESTING)
-            recurs = self.schedule.recurs(step) and not isinstance(self.flow.sequence, MarchedFlow)
+            recurs = self.schedule.recurs(step) and self.recurring
             self.transport.advance(operators, step.t0, step.dt, recurs)
+            if warm is not None:
+                warm.finish(velocity, step.dt)
         except ConvergenceError as error:
-            self.coverage.recall(before)
+            self._recall(before)
             raise ConvergenceError(f"step {step.index + 1}: {error}") from error
         self._velocity = velocity
+
+    def _memento(self) -> tuple[Memento, TransportMemento, ThermalMemento | None]:
+        thermal = None if self.thermal is None else self.thermal.memento()
+        return self.coverage.memento(), self.transport.memento(), thermal
+
+    def _recall(self, memento: tuple[Memento, TransportMemento, ThermalMemento | None]) -> None:
+        coverage, transport, thermal = memento
+        self.coverage.recall(coverage)
+        self.transport.recall(transport)
+        if self.thermal is not None and thermal is not None:
+            self.thermal.recall(thermal)
 
     def _slide(self, step: Step) -> float:
         """How far the bed slides over the mesh during `step` [m]: with the mean velocity where the flow is a mean, too.
@@ -141,9 +172,13 @@ class System:
             "species": transport.stored(scatter),
             "ledger": transport.ledger.stored(self.comm, scatter, self.coverage.scatter),
             "coverage": self.coverage.stored(),
-            "flow": {"fields": scatter.to_root(sequence.stored(self.strip.owned))},
             "initially": {"sites": self.sites_initially, "stored": self.stored_initially},
+            "flow": {},
         }
+        if self.thermal is not None:
+            parts |= self.thermal.stored()
+        elif isinstance(sequence, MarchedFlow | CyclicFlow):
+            parts["flow"]["fields"] = scatter.to_root(sequence.stored(self.strip.owned))
         if isinstance(sequence, MarchedFlow):
             parts["flow"]["done"] = sequence.done
         if dispersion is not None:
@@ -164,18 +199,28 @@ class System:
             parts["initially"]["sites"],
             parts["initially"]["stored"],
         )
-        self._use(self._restored_flow(parts["flow"]), steps)
+        if self.thermal is not None:
+            self.thermal.restore(parts, steps)
+        self._use(self._restored_flow(parts.get("flow", {})), steps)
 
     def _restored_flow(self, stored: dict[str, Any]) -> Flow:
         known = conditions(self.case, self.schedule)
+        if self.thermal is not None:
+            return self._with_dispersion(Flow(self.thermal.flow, self.strip.cell, known), stored)
         if "done" in stored:
             marched = MarchedFlow(self.case, self.strip, self.bed_motion, self.schedule)
             marched.restore(stored["fields"], int(stored["done"]))
             return Flow(marched, self.strip.cell, known)
         rests = begins_at_rest(self.case, self.schedule)
         cyclic = CyclicFlow.restored(self.strip, stored["fields"], rests)
+        return self._with_dispersion(Flow(cyclic, self.strip.cell, known), stored)
+
+    def _with_dispersion(self, flow: Flow, stored: dict[str, Any]) -> Flow:
         if "dispersion" not in stored:
-            return Flow(cyclic, self.strip.cell, known)
+            return flow
         dispersion = stored["dispersion"][:, :, self.strip.cell]
-        dispersed_in = dispersion_conditions(self.case, self.transport.diffusivities)
-        return Flow(cyclic, self.strip.cell, known, dispersion, dispersed_in)
+        return replace(
+            flow,
+            dispersion=dispersion,
+            dispersed_in=dispersion_conditions(self.case, self.transport.diffusivities),
+        )

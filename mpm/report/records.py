@@ -21,13 +21,36 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
+class HeatTotals:
+    """Heat into the strip since the start of a run, counted from the temperature of `[gas]` [J per metre of depth].
+
+    `inlets` (inlets,), `outlets` (outlets,) with the gas (what is drawn back in included), `walls` (walls,) by conduction, `solids` with
+    those that enter less those that leave, `heating` electrical, `reaction` given off by reactions; `stored`, `stored_initially` in gas and
+    solids. `gas_passed` came in of the gas less what left, `gas`, `gas_initially` are in the strip, at the density of the case [m2].
+    """
+
+    inlets: Floats
+    outlets: Floats
+    walls: Floats
+    solids: float
+    heating: float
+    reaction: float
+    stored: float
+    stored_initially: float
+    gas_passed: float
+    gas: float
+    gas_initially: float
+
+
+@dataclass(frozen=True, eq=False)
 class Totals:
     """Sums over all ranks since the start of a run [mol/m, m2], by species of the run (`names`).
 
     `fed` (inlets, species), `out`, `back` (outlets, species), `out_volume`, `back_volume` (outlets,), `stored`, `stored_initially`
     (species,) in the gas; `surface` (reactions, reactive rows, columns) and `gas` (reactions, zones + 1) events, the last by zone number
     (0: none); `reactive_rows` the grid's rows with reactive surface; `slid` the bed's way relative to the reactor [m];
-    `sites`, `sites_initially` (site species,) on the solids in the strip, `sites_passed` those that left minus those that entered.
+    `sites`, `sites_initially` (site species,) on the solids in the strip, `sites_passed` those that left minus those that entered; `heat`
+    of a case with `[energy]`.
     """
 
     names: tuple[str, ...]
@@ -45,6 +68,7 @@ class Totals:
     sites: Floats
     sites_initially: Floats
     sites_passed: Floats
+    heat: HeatTotals | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +76,7 @@ class State:
     """Numbers of one instant: `theta` (sites, reactive rows, columns) and the CVD rate per zone and at its largest.
 
     `cvd` is the integral of the rate over each zone's strip (zones + 1,) [mol/m/s], `cvd_max` the largest rate per total volume;
-    `concentration` the dosed species by name, (rows, columns) [mol/m3].
+    `concentration` the dosed species by name, (rows, columns) [mol/m3]; `temperature` (rows, columns) [K] of a case with `[energy]`.
     """
 
     theta: Floats
@@ -60,6 +84,7 @@ class State:
     cvd: Floats
     cvd_max: float
     concentration: Mapping[str, Floats]
+    temperature: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,9 +101,10 @@ class CellMatrix:
 
 
 class StepMatrix:
-    """gas_volume/dt + fluxes for species that diffuse alike, with the solvers that go with it; `fill` as in KrylovSolver.
+    """storage/dt + fluxes for what spreads alike, with the solvers that go with it; `fill` as in KrylovSolver.
 
-    A solution leaves a sum of |residual| over all cells below `residual` [mol/m/s].
+    Stored are species, in the volume of the gas, unless `update` says otherwise. A solution leaves a sum of |residual| over all cells below
+    `residual` [mol/m/s].
     """
 
     def __init__(self, strip: Strip, name: str, residual: float, fill: int = 0):
@@ -116,11 +117,14 @@ class StepMatrix:
         self._serving: ServingSolver | None = None  # once the matrix recurs
         self._x, self._y = self.cells.matrix.createVecs()
 
-    def update(self, operator: FluxOperator, dt: float) -> None:
-        """Make it the matrix of `operator` over a step of `dt` [s], infinite for the steady one."""
+    def update(self, operator: FluxOperator, dt: float, storage: Floats | None = None) -> None:
+        """Make it the matrix of `operator` over a step of `dt` [s], infinite for the steady one.
+
+        `storage` (own,) [m2] goes with the version of the operator; left out: the volume of the gas.
+        """
         if self._holds != (operator.version, dt):
-            storage = self.strip.gas_volume[: self.strip.owned] / dt
-            self.cells.assemble(self.cells.set_fluxes([operator])[0] + storage)
+            held = self.strip.gas_volume[: self.strip.owned] if storage is None else storage
+            self.cells.assemble(self.cells.set_fluxes([operator])[0] + held / dt)
             self._holds = (operator.version, dt)
 
     def multiply(self, values: Floats) -> Floats:

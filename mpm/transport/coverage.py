@@ -1,8 +1,7 @@
 """Coverage of the solids, carried by the solids.
 
 Sites live in material columns. A layer at rest keeps its columns; the moving layer's columns slide over the gas mesh by whole columns
-whenever the accumulated distance passes half a column. Nothing is interpolated: no numerical diffusion, sites conserved exactly, and a
-position error below one column. Columns that slide out are remembered at either end, because the bed moves back for part of a cycle.
+(`mpm.transport.columns`) whenever the accumulated distance passes half a column.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.mesh.strip import Strip
 from mpm.parallel import Scatter
+from mpm.transport.columns import Beyond, SlidingColumns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from mpm.physics.kinetics import SurfaceKinetics
 
 TIE = 1e-6  # of a column: half a column, reached by rounding from either side, is always not yet enough
-MEMORY = 64  # columns remembered beyond each end; the bed swings back by a few at most
 
 
 def initial(site: str) -> Callable[[Material], float]:
@@ -39,8 +38,7 @@ class Memento:
     theta: Floats
     distance: float
     shifted: int
-    left: list[Floats]
-    right: list[Floats]
+    beyond: Beyond
     passed: Floats
 
 
@@ -76,8 +74,7 @@ class Coverage:
         self._theta = np.ascontiguousarray(self.fresh[:, self.place])
         self.distance = 0.0
         self.shifted = 0  # columns already moved
-        self._left: list[Floats] = []  # columns (sites, moving rows) beyond the left end, nearest last
-        self._right: list[Floats] = []
+        self._columns = SlidingColumns(self.fresh[:, self.moving_rows], self.periodic)
         self.passed = np.zeros(len(names))
 
     @property
@@ -118,51 +115,33 @@ class Coverage:
         count = target - self.shifted
         if count and len(self.moving_rows):
             whole = self.whole()
-            moving = whole[:, self.moving_rows]
-            if self.periodic:
-                moving = np.roll(moving, count, axis=2)
-            else:
-                for _ in range(abs(count)):
-                    moving = self._shift(moving, 1 if count > 0 else -1)
+            moving, exchanged = self._columns.shift(whole[:, self.moving_rows], count)
+            grid = self.strip.grid
+            capacity = (self._row_surface * self._row_sites * grid.dy[self.rows] * grid.dx)[self.moving_rows]
+            self.passed = self.passed + exchanged @ capacity
             whole[:, self.moving_rows] = moving
             self._theta = self.scatter.to_local(whole.reshape(len(whole), -1))
         self.shifted = target
         return count
 
-    def _shift(self, moving: Floats, direction: int) -> Floats:
-        """One column to the right (+1) or left (-1): what leaves is remembered, what enters is remembered or fresh."""
-        leaving, entering = (self._right, self._left) if direction > 0 else (self._left, self._right)
-        grid = self.strip.grid
-        capacity = (self._row_surface * self._row_sites * grid.dy[self.rows] * grid.dx)[self.moving_rows]
-        gone = moving[:, :, -1 if direction > 0 else 0].copy()
-        leaving.append(gone)
-        new = entering.pop() if entering else self.fresh[:, self.moving_rows]
-        self.passed = self.passed + (gone - new) @ capacity
-        shifted = np.roll(moving, direction, axis=2)
-        shifted[:, :, 0 if direction > 0 else -1] = new
-        del leaving[:-MEMORY]
-        return shifted
-
     # --- going back ---
 
     def memento(self) -> Memento:
         """The present state; cheap, because arrays are replaced and never changed in place."""
-        return Memento(
-            self._theta, self.distance, self.shifted, list(self._left), list(self._right), self.passed
-        )
+        return Memento(self._theta, self.distance, self.shifted, self._columns.memento(), self.passed)
 
     def recall(self, memento: Memento) -> None:
         """Go back to a state of this run."""
         self._theta, self.distance, self.shifted = memento.theta, memento.distance, memento.shifted
-        self._left, self._right, self.passed = list(memento.left), list(memento.right), memento.passed
+        self.passed = memento.passed
+        self._columns.recall(memento.beyond)
 
     def stored(self) -> dict[str, Any]:
         """Arrays of a restart state, in grid order on rank 0 (None elsewhere for `theta`); collective."""
         return {
             "theta": self.scatter.to_root(self._theta),
             "passed": self.passed,
-            "left": np.asarray(self._left),
-            "right": np.asarray(self._right),
+            **self._columns.stored(),
             "distance": self.distance,
             "shifted": self.shifted,
         }
@@ -171,5 +150,5 @@ class Coverage:
         """The inverse of `stored`, on every rank."""
         self._theta = self.scatter.to_local(stored["theta"])
         self.passed = stored["passed"]
-        self._left, self._right = list(stored["left"]), list(stored["right"])
+        self._columns.restore(stored)
         self.distance, self.shifted = float(stored["distance"]), int(stored["shifted"])

@@ -6,6 +6,13 @@ Between two cell centres the flux of the one-dimensional problem with constant v
 fitting): F = g (B(-Pe) C_behind - B(Pe) C_ahead), B(z) = z / (exp z - 1), Pe = u / g, where 1/g is the sum of the half-cell
 resistances h / (2 D_eff). It is second order where diffusion dominates, upwind in the limit, and always gives an M-matrix:
 concentrations stay positive and within bounds. Fluxes are per metre of depth.
+
+In gas that is not everywhere equally hot (`mpm.flow.state`) what is carried and what diffuses is the mole fraction x_i,
+
+    div(n u x_i - n D_eff grad x_i),   n u = m/M,
+
+so that a uniform x_i stays uniform whatever the temperature does. With n over that of `[gas]`, nu, it is the same with u the mass flux over
+the case's density, nu D_eff in place of D_eff, and C/nu in place of C: the coefficients of C are divided by nu of its cell.
 """
 
 from __future__ import annotations
@@ -73,7 +80,9 @@ def face_conductance(strip: Strip, diffusivity: Floats) -> Floats:
 class PortFlux:
     """One port's exchange with its cells: species leave at `out` C_cell and enter at `into` C_port [m2/s each].
 
-    `area` (n,) is the open length of each cell's facet [m], `volume_out` the gas flow out through it [m2/s].
+    `area` (n,) is the open length of each cell's facet [m], `volume_out` the gas flow out through it [m2/s]; `weights` (n,) times the
+    concentrations of the cells, summed up and over the sum of `area`, is the mean of what is next to the port. Volumes are those at the
+    state of `[gas]`, and so is C_port.
     """
 
     cells: Ints
@@ -81,6 +90,7 @@ class PortFlux:
     into: Floats
     area: Floats
     volume_out: Floats
+    weights: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,15 +112,21 @@ class FluxOperator:
 
 
 class FluxAssembler:
-    """Builds the flux operators of what diffuses with D_eff `diffusivity` (2, local cells) [m2/s] in many velocity fields."""
+    """Builds the flux operators of what diffuses with D_eff `diffusivity` (2, local cells) [m2/s] in many velocity fields.
 
-    def __init__(self, case: Case, strip: Strip, diffusivity: Floats):
-        self.case, self.strip, self.diffusivity = case, strip, diffusivity
+    `relative` (local cells,) is nu, None where that is 1 everywhere; `diffusivity` is then nu D_eff.
+    """
+
+    def __init__(self, case: Case, strip: Strip, diffusivity: Floats, relative: Floats | None = None):
+        self.case, self.strip, self.diffusivity, self.relative = case, strip, diffusivity, relative
         self.conductance = face_conductance(strip, diffusivity)
 
     def operator(self, flow: FaceFlow) -> FluxOperator:
         """The operator of one velocity field; collective."""
         from_behind, from_ahead = exponential_flux(flow.inner, self.conductance)
+        if self.relative is not None:
+            from_behind /= self.relative[self.strip.faces.behind]
+            from_ahead /= self.relative[self.strip.faces.ahead]
         inlets = {inlet.name: self._inlet(inlet, flow) for inlet in self.case.geometry.inlets}
         outlets = {outlet.name: self._outlet(outlet, flow) for outlet in self.case.geometry.outlets}
         drawn = any(np.any(port.into > 0.0) for port in outlets.values())
@@ -141,7 +157,9 @@ class FluxAssembler:
         if self.case.geometry.inlet_diffusion:
             conductance = 2.0 * self.diffusivity[1][cells] / strip.height[cells]
         into, out = exponential_flux(volume_in / area, conductance)
-        return PortFlux(cells, out * area, into * area, area, np.maximum(-volume_in, 0.0))
+        leaving = self._per_concentration(out * area, cells)
+        weights = self._per_concentration(area, cells)
+        return PortFlux(cells, leaving, into * area, area, np.maximum(-volume_in, 0.0), weights)
 
     def _outlet(self, outlet: Outlet, flow: FaceFlow) -> PortFlux:
         """Convection alone: gas leaves with what its cell holds."""
@@ -150,5 +168,10 @@ class FluxAssembler:
         mine = np.flatnonzero(strip.grid.opening(outlet)[strip.column[cells]])
         volume_in = flow.inward(outlet.side)[mine] * strip.grid.dx
         area = np.full(len(mine), strip.grid.dx)
-        out = np.maximum(-volume_in, 0.0)
-        return PortFlux(cells[mine], out, np.maximum(volume_in, 0.0), area, out)
+        out, cells = np.maximum(-volume_in, 0.0), cells[mine]
+        leaving, weights = self._per_concentration(out, cells), self._per_concentration(area, cells)
+        return PortFlux(cells, leaving, np.maximum(volume_in, 0.0), area, out, weights)
+
+    def _per_concentration(self, coefficients: Floats, cells: Ints) -> Floats:
+        """Coefficients of the concentrations of `cells`, from those of what is carried."""
+        return coefficients if self.relative is None else coefficients / self.relative[cells]

@@ -68,7 +68,8 @@ class Ports:
         return supply
 
     def outlet_means(self, operators: Sequence[FluxOperator], concentration: Floats) -> dict[str, Floats]:
-        """Area mean of the cells next to each outlet, (species,) [mol/m3], where any outlet draws in (else nothing); collective.
+        """Area mean of the cells next to each outlet, (species,) [mol/m3 at the state of `[gas]`], where any outlet draws in (else
+        nothing); collective.
 
         One row of cells; the thesis takes two.
         """
@@ -77,7 +78,7 @@ class Ports:
         operator = operators[0]
         sums = []
         for port in operator.outlets.values():
-            sums.append([*(concentration[:, port.cells] @ port.area), port.area.sum()])
+            sums.append([*(concentration[:, port.cells] @ port.weights), port.area.sum()])
         rows = total(self.strip.comm, sums)
         return {name: row[:-1] / row[-1] for name, row in zip(operator.outlets, rows, strict=True)}
 

@@ -67,6 +67,11 @@ class Reactions:
         tied = np.linalg.lstsq(used, -made, rcond=None)[0]
         return np.where(np.abs(used @ tied + made).max(axis=0, initial=0.0) < EXACT, tied, 0.0).T
 
+    def heat_to(self, temperature: Floats) -> None:
+        """Let all reactions run at the `temperature` of own cells [K]."""
+        self.surface.heat_to(temperature[self.coverage.cells])
+        self.gas.heat_to(temperature)
+
     @property
     def gas_volume(self) -> Floats:
         """Volume of the gas in own cells [m2]."""
@@ -109,7 +114,7 @@ class Reactions:
     def in_gas(self, cells: Ints, concentration: Floats) -> tuple[Floats, Floats]:
         """The same in the gas of own `cells` at these concentrations (coupled, n)."""
         nu, volume = self._nu_gas[:, : self.coupled], self.gas_volume[cells]
-        rates, slopes = self.gas.rates(concentration)
+        rates, slopes = self.gas.part(cells).rates(concentration)
         return nu.T @ rates * volume, _slopes(nu, slopes, volume)
 
 

@@ -9,7 +9,7 @@ the reacting species alone. Species that are only made follow afterwards, one li
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,16 +18,17 @@ from numpy.typing import NDArray
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.flow.fields import FlowField, face_flow
+from mpm.flow.state import GasState
 from mpm.mesh.strip import Strip
-from mpm.numerics.linear import KrylovSolver
 from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.parallel import Scatter, largest, total
 from mpm.physics.roles import Roles
-from mpm.transport.cell_matrix import CellMatrix, StepMatrix, interleaved
-from mpm.transport.coverage import Coverage, Memento
+from mpm.transport.cell_matrix import StepMatrix
+from mpm.transport.coverage import Coverage
 from mpm.transport.fluxes import FluxAssembler, FluxOperator, cell_diffusivity
 from mpm.transport.foresight import REMEMBERED, Past, possible
 from mpm.transport.ledger import Entries, Ledger
+from mpm.transport.newton import RESIDUAL, NewtonSystem, forcing
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Events, Reactions
 
@@ -38,20 +39,22 @@ Operators = list[FluxOperator]  # of one velocity field, one per species
 NEWTON_LIMIT = 30
 # levels of fill-in of the incomplete factors, for reacting species and for products: with `resolved` every step has a matrix of its own
 FILL = {"resolved": (1, 0), "averaged": (2, 2), "steady": (2, 2)}
-RESIDUAL = 1e-12  # sum of |residual| over all cells, relative to the largest feed
 # backward-error floor, relative to the sum of |diagonal C|: a residual below that is rounding, and accepted
 ROUNDING = float(np.finfo(float).eps)
 UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
 IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
-FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
-QUADRATIC = 0.3  # inner tolerance over the residual, whose next value is about its square in any case
-# what the inner tolerance aims at, and no further: traces far from their inlet are reported too
-LAST = 1e-5 * RESIDUAL
-# Krylov iterations with the factor of an earlier matrix after which the next system gets its own, which costs as much as three of them
-PATIENCE = 5
 HALVINGS = 6
 BALANCED = 1e-4  # residual below which Newton's steps have no need of balanced cells
 NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
+
+
+@dataclass(frozen=True, eq=False)
+class TransportMemento:
+    """What the gas holds and held, and the accounts, at one instant."""
+
+    concentration: Floats
+    past: Past
+    ledger: Entries
 
 
 class Transport:
@@ -74,27 +77,49 @@ class Transport:
         diffusivities = [case.gas.diffusivity[name] for name in self.names]
         self.diffusivities = sorted(set(diffusivities))
         self._group = [self.diffusivities.index(d) for d in diffusivities]
-        self._at_rest = self._assemblers(np.zeros(len(self.diffusivities)))
-        self._in_motion = self._at_rest
+        self._dispersion: Floats | None = None
+        self._gas: GasState | None = None
+        self._assemble()
         fill, product_fill = FILL[case.fidelity]
         residual = self.ports.feed_rate * RESIDUAL
         self._linear = [
             StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill)
             for d in self.diffusivities
         ]
-        self._newton = _Newton(strip, self.coupled, fill) if self.coupled else None
+        self._newton = NewtonSystem(strip, self.coupled, fill) if self.coupled else None
+
+    def _assemble(self) -> None:
+        """What builds operators, of a reactor at rest and in motion, in the present state of the gas."""
+        self._at_rest = self._in_motion = self._assemblers(np.zeros(len(self.diffusivities)))
+        if self._dispersion is not None:
+            self._in_motion = self._assemblers(self._dispersion)
 
     def _assemblers(self, dispersion: Floats) -> list[FluxAssembler]:
         """Those of the diffusivities in the pores, each with its `dispersion` added."""
-        return [
-            FluxAssembler(self.case, self.strip, cell_diffusivity(self.strip, molecular) + added)
-            for molecular, added in zip(self.diffusivities, dispersion, strict=True)
-        ]
+        case, strip, gas = self.case, self.strip, self._gas
+        found = []
+        for molecular, added in zip(self.diffusivities, dispersion, strict=True):
+            effective = cell_diffusivity(strip, molecular)
+            if gas is None:
+                found.append(FluxAssembler(case, strip, effective + added))
+            else:
+                hotter = case.gas.diffusivity_factor(gas.temperature)
+                found.append(
+                    FluxAssembler(case, strip, gas.relative * (hotter * effective + added), gas.relative)
+                )
+        return found
 
     def disperse(self, dispersion: Floats) -> None:
         """Add `dispersion` (diffusivities, 2, local cells) [m2/s] to diffusion while the reactor vibrates, where the mean of the flow
         stands for its cycle."""
-        self._in_motion = self._assemblers(dispersion)
+        self._dispersion = dispersion
+        self._assemble()
+
+    def follow(self, gas: GasState) -> None:
+        """Let species diffuse and react in another state of the gas."""
+        self._gas = gas
+        self._assemble()
+        self.reactions.heat_to(gas.temperature[: self.strip.owned])
 
     def operators(self, flow: FlowField, at_rest: bool = False) -> Operators:
         """The operator of each species in a velocity field, that of a reactor `at_rest` or in motion; collective."""
@@ -151,24 +176,30 @@ class Transport:
         Steps that `recurs` are many with the same operators and the same `dt`. A step whose Newton iteration fails is halved, up to
         HALVINGS times. Raises ConvergenceError after that.
         """
-        before = self.concentration, self.past, self.coverage.memento(), self.ledger.memento()
+        before, covered = self.memento(), self.coverage.memento()
         try:
             self._advance(operators, t0, dt, recurs)
         except ConvergenceError as error:
-            self._recall(*before)
+            self.recall(before)
+            self.coverage.recall(covered)
             if halvings == HALVINGS:
                 raise ConvergenceError(f"t = {t0:.6g} s, step of {dt:.3g} s: {error}") from error
             try:
                 self.advance(operators, t0, 0.5 * dt, halvings=halvings + 1)
                 self.advance(operators, t0 + 0.5 * dt, 0.5 * dt, halvings=halvings + 1)
             except ConvergenceError:
-                self._recall(*before)
+                self.recall(before)
+                self.coverage.recall(covered)
                 raise
 
-    def _recall(self, concentration: Floats, past: Past, coverage: Memento, ledger: Entries) -> None:
-        self.concentration, self.past = concentration, past
-        self.coverage.recall(coverage)
-        self.ledger.recall(ledger)
+    def memento(self) -> TransportMemento:
+        """Gas and accounts at present; cheap, because arrays are replaced and never changed in place."""
+        return TransportMemento(self.concentration, self.past, self.ledger.memento())
+
+    def recall(self, memento: TransportMemento) -> None:
+        """Go back to gas and accounts of this run."""
+        self.concentration, self.past = memento.concentration, memento.past
+        self.ledger.recall(memento.ledger)
 
     def _advance(self, operators: Operators, t0: float, dt: float, recurs: bool) -> None:
         old, coupled = self.concentration, self.coupled
@@ -196,7 +227,13 @@ class Transport:
         self.ledger.book(self.ports, operators, new, dt, shares, drawn, events)
 
     def _solve_coupled(
-        self, newton: _Newton, operators: Operators, dt: float, old: Floats, supply: Floats, foreseen: Floats
+        self,
+        newton: NewtonSystem,
+        operators: Operators,
+        dt: float,
+        old: Floats,
+        supply: Floats,
+        foreseen: Floats,
     ) -> tuple[Floats, Events]:
         """Inexact Newton on the reacting species; returns their concentrations at the end of the step and the events of it."""
         reactions, cells, theta = self.reactions, self.coverage.cells, self.coverage.theta
@@ -250,38 +287,3 @@ class Transport:
         start = np.maximum(new[:, cells], LOWEST)
         balanced = balance_locally(start, diagonal[:, cells], inflow, sources, idle, tries=3)
         return np.where(inflow > 0.0, balanced, 0.0)
-
-
-class _Newton:
-    """The linear systems of Newton's method on the reacting species."""
-
-    def __init__(self, strip: Strip, unknowns: int, fill: int):
-        self.unknowns = unknowns
-        self.order = interleaved(strip.row[: strip.owned], strip.column[: strip.owned])
-        self.cells = CellMatrix(strip, unknowns, self.order)
-        self.krylov = KrylovSolver(self.cells.matrix, "reacting species", FORCING, fill=fill)
-        self.step, self.rhs = self.cells.matrix.createVecs()
-        self._iterations = 0  # of the last solve
-
-    def set_fluxes(self, operators: Sequence[FluxOperator]) -> Floats:
-        """Enter the fluxes of the unknowns; returns what they add to the diagonal, (unknowns, own) [m2/s]."""
-        return self.cells.set_fluxes(operators)
-
-    def solve(self, blocks: Floats, residual: Floats, tolerance: float, first: bool) -> Floats:
-        """The step (unknowns, own) with `blocks` (own, unknowns, unknowns) on the diagonal, the `first` of an iteration or not; collective.
-
-        The factor of the first matrix serves as long as it serves well: cells in which sites run out change the matrix.
-        """
-        self.cells.assemble(blocks)
-        self.rhs.array[:] = residual[:, self.order].T.ravel()
-        refactor = first or self._iterations > PATIENCE
-        self._iterations = self.krylov.solve(self.rhs, self.step, tolerance, refactor=refactor)
-        step = np.empty_like(residual)
-        step[:, self.order] = self.step.array.reshape(-1, self.unknowns).T
-        return step
-
-
-def forcing(residual: float) -> float:
-    """Inner tolerance that keeps Newton's quadratic convergence (Eisenstat and Walker 1996, choice 2 in spirit): nothing is gained below
-    LAST."""
-    return min(max(QUADRATIC * residual, LAST / residual), FORCING)

@@ -226,8 +226,8 @@ class TracerSolver:
         _book(transport, operators, transport.ports.steady_shares, transport.reactions.none())
 
 
-def steady_problem(system: System, watch: Watch) -> SteadyProblem:
-    """The problem of a system in its steady flow: nonlinear where gas that reacts comes in."""
+def species_problem(system: System, watch: Watch) -> SteadyProblem:
+    """The species and coverage of a system in its steady flow: nonlinear where gas that reacts comes in."""
     ports, coupled = system.transport.ports, system.transport.coupled
     supply = ports.supply(system.operators(system.velocity), ports.steady_shares, {})[:coupled]
     if any_rank(system.comm, bool(supply.any())):

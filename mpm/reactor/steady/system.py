@@ -186,5 +186,5 @@ class SteadySystem:
         whole = total(self.strip.comm, [port.area.sum() for port in self._drawing])
         for k, (port, area) in enumerate(zip(self._drawing, whole, strict=True)):
             values[f"gas by mean {k}"] = np.tile(-port.into, self.coupled)
-            values[f"mean {k} by gas"] = np.tile(-port.area / area, self.coupled)
+            values[f"mean {k} by gas"] = np.tile(-port.weights / area, self.coupled)
         self.jacobian.fill(values)

@@ -1,0 +1,154 @@
+"""The flow of gas whose temperature changes slowly against a cycle: a mean or a cycle that follows it.
+
+It belongs to the temperatures at which it was found, and is found anew when these have moved by more than `energy.flow_update`; until then
+what heating drives out of the cells (`mpm.flow.density`) and what buoyancy gains are added as creeping flow, one back-substitution a step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mpm.arrays import Floats
+from mpm.flow.density import Density, moved, restored_state
+from mpm.flow.fields import FlowField
+from mpm.flow.problem import STEADY, FlowProblem
+from mpm.flow.sequence import CyclicFlow, Watch
+from mpm.flow.state import GasState
+from mpm.motion.kinematics import BedMotion
+from mpm.motion.schedule import RESTING, Schedule, Step
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+    from mpm.mesh.strip import Strip
+
+
+class HeatedCycle:
+    """A mean flow or a cycle that follows the temperature (`averaged`, `resolved`)."""
+
+    def __init__(
+        self,
+        case: Case,
+        strip: Strip,
+        bed_motion: BedMotion,
+        schedule: Schedule,
+        temperature: Floats,
+        watch: Watch | None = None,
+    ):
+        self.case, self.strip, self.bed_motion, self.schedule = case, strip, bed_motion, schedule
+        self.watch = watch
+        self._update = 0.0 if case.energy is None else case.energy.flow_update
+        self.density = Density(case, strip, temperature)
+        self.found_in = self.density.gas
+        self._problem: FlowProblem | None = None
+        self.cycle: CyclicFlow | None = None
+        self._more: Floats | None = None  # velocities (4, local cells) beside those of the cycle
+        self._driven = False  # gas is being given off
+        self._fields: dict[FlowField, FlowField] = {}
+
+    @property
+    def gas(self) -> GasState:
+        return self.density.gas
+
+    @property
+    def changed(self) -> bool:
+        """Whether fields and density are others than in the step before."""
+        return self.density.changed or self._driven
+
+    def find(self, watch: Watch | None = None, vibrates: bool = False) -> CyclicFlow:
+        """Find the flow in the present state of the gas, from the one before; a reactor that `vibrates` needs no field at rest any more.
+
+        Raises ConvergenceError, the flow before kept.
+        """
+        problem, guess = self._new_problem(self.gas), self.cycle
+        if guess is not None and vibrates:
+            guess = CyclicFlow(None, guess.phases)
+        self.cycle = CyclicFlow.found(problem, self.bed_motion, self.schedule, watch, guess)
+        problem.release(kept=STEADY)
+        self._problem, self.found_in = problem, self.gas
+        self._more, self._fields = None, {}
+        return self.cycle
+
+    def find_again(self, exact: bool) -> bool:
+        """Find the flow with the weight that the gas has now; with its viscosity and density, too, where `exact` or these have moved by
+        more than `energy.flow_update`. Returns whether they are those of now. Raises ConvergenceError.
+        """
+        since = moved(self.strip, self.gas.temperature, self.found_in.temperature)
+        if exact or since > self._update:
+            self.find()
+            return True
+        problem = self._solver()
+        problem.weigh_as(self.gas)
+        self.cycle = CyclicFlow.found(problem, self.bed_motion, self.schedule, guess=self.cycle)
+        return False
+
+    def _new_problem(self, gas: GasState) -> FlowProblem:
+        return FlowProblem(self.case, self.strip, self.schedule.dt, refined=True, gas=gas)
+
+    def _solver(self) -> FlowProblem:
+        """The problem in the state of the gas in which the flow was found."""
+        if self._problem is None:
+            self._problem = self._new_problem(self.found_in)
+        return self._problem
+
+    def follow(self, temperature: Floats, step: Step) -> None:
+        """Let the density follow the `temperature` of own cells [K] during `step`; collective. Raises ConvergenceError."""
+        density, was_driven = self.density, self._driven
+        density.follow(temperature, step.dt)
+        self._driven = density.changed
+        if not (density.changed or was_driven):
+            return
+        if moved(self.strip, self.gas.temperature, self.found_in.temperature) > self._update:
+            self.find(vibrates=step.phase != RESTING)
+        problem = self._solver()
+        driven = problem.driven(density.source if density.changed else None, problem.lighter(self.gas))
+        self._more, self._fields = problem.space.velocities(driven), {}
+
+    def at(self, step: Step) -> FlowField:
+        """The field of the step's phase, and what is added to it."""
+        return self._with_more(self._cycle.at(step))
+
+    shown = at
+
+    @property
+    def _cycle(self) -> CyclicFlow:
+        return self.cycle if self.cycle is not None else self.find(self.watch)
+
+    def _with_more(self, field: FlowField) -> FlowField:
+        if self._more is None:
+            return field
+        if field not in self._fields:
+            self._fields[field] = replace(field, velocities=field.velocities + self._more)
+        return self._fields[field]
+
+    def mean(self) -> FlowField:
+        """Mean over the cycle as it is now."""
+        return self._with_more(self._cycle.mean())
+
+    # --- restart ---
+
+    def stored(self) -> dict[str, Any]:
+        """Arrays of a restart state, in grid order on rank 0 (None elsewhere); collective."""
+        own, scatter = self.strip.owned, self.strip.scatter
+        cycle, then = self._cycle, self.found_in
+        more = np.zeros((4, own)) if self._more is None else self._more[:, :own]
+        return {
+            **self.density.stored(),
+            "fields": scatter.to_root(cycle.stored(own)),
+            "rests": cycle.at_rest is not None,
+            "found_in": scatter.to_root(np.stack([then.temperature, then.relative])[:, :own]),
+            "more": scatter.to_root(more),
+            "driven": self._driven,
+        }
+
+    def restore(self, stored: dict[str, Any], steps: int) -> None:
+        """The inverse of `stored`, on every rank, after `steps`."""
+        self.density.restore(stored)
+        self.cycle = CyclicFlow.restored(self.strip, stored["fields"], bool(stored["rests"]))
+        self.found_in = restored_state(self.case, stored["found_in"][:, self.strip.cell])
+        more = np.ascontiguousarray(stored["more"][:, self.strip.cell])
+        self._more = more if stored["more"].any() else None
+        self._driven = bool(stored["driven"])
+        self._problem, self._fields = None, {}

@@ -1,0 +1,208 @@
+"""Heat of a reactor with `[energy]`, and the order in which temperature, density, flow, species and reactions follow each other.
+
+In a step the bed slides with its heat; the density follows the temperature and the flow what that gives off; species react at that
+temperature; what they give off, conduction and flow then make the new temperature. Everything that is carried meets the same flow and the
+same density, so species, gas and heat balance to rounding in every step; density and rates are those of the beginning of the step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mpm.arrays import Floats
+from mpm.errors import ConvergenceError
+from mpm.flow.heated import HeatedCycle
+from mpm.flow.heated_march import HeatedMarch
+from mpm.flow.sequence import Watch
+from mpm.flow.state import GasState, gas_amount
+from mpm.motion.schedule import Schedule, Step
+from mpm.numerics.anderson import Anderson
+from mpm.parallel import within
+from mpm.report.records import HeatTotals
+from mpm.transport.heat import Heat, HeatMemento, HeatOperator
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+    from mpm.flow.fields import FlowField
+    from mpm.mesh.strip import Strip
+    from mpm.motion.kinematics import BedMotion
+    from mpm.transport.species import Transport
+
+HeatedFlow = HeatedCycle | HeatedMarch
+TURNS = 100  # of flow and temperature, on the way to the steady state
+SETTLED = 1e-3  # K, largest change of a temperature in the last turn
+DEPTH, SHARE = (
+    20,
+    0.5,
+)  # of Anderson's mixture: 30 turns where the gas turns over, 40 with a depth of 10, no end with 6
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalMemento:
+    """Heat, state of the gas and events at one instant, to go back to."""
+
+    heat: HeatMemento
+    gas: GasState
+
+
+class Thermal:
+    """The `heat` of a strip and the `flow` of its gas, with the reactions of `transport` as a source."""
+
+    def __init__(self, case: Case, strip: Strip, motion: BedMotion, schedule: Schedule, transport: Transport):
+        self.case, self.strip, self.motion, self.schedule = case, strip, motion, schedule
+        self.transport = transport
+        self.heat = Heat(case, strip)
+        self.flow: HeatedFlow = self._new_flow()
+        self._operators: dict[FlowField, HeatOperator] = {}
+        gas = case.gas.temperature
+        reactions, mechanism = transport.reactions, case.mechanism
+        self._surface_heat = [-mechanism.heat_of_reaction(r, gas) for r in reactions.surface.reactions]
+        self._gas_heat = [-mechanism.heat_of_reaction(r, gas) for r in reactions.gas.reactions]
+        self.count_from_here()
+        transport.follow(self.gas)
+
+    def _new_flow(self) -> HeatedFlow:
+        parts = self.case, self.strip, self.motion, self.schedule, self.heat.temperature
+        marched = self.case.fidelity == "resolved" and self.case.motion.startup == "impulsive"
+        return HeatedMarch(*parts) if marched else HeatedCycle(*parts)
+
+    @property
+    def gas(self) -> GasState:
+        """The gas as the last step met it."""
+        return self.flow.gas
+
+    def count_from_here(self) -> None:
+        """Let balances count from the present contents."""
+        self._stored_initially = self.heat.content(self.gas)
+        self._gas_initially = gas_amount(self.strip, self.gas.relative)
+
+    def find_flow(self, watch: Watch | None = None) -> None:
+        """Find the flow in the present state; in the steady one the temperatures that go with it, too. Raises ConvergenceError."""
+        if isinstance(self.flow, HeatedCycle):
+            self.flow.find(watch)
+            if self.case.fidelity == "steady":
+                self._settle_flow(self.flow)
+                self.transport.follow(self.gas)
+
+    # --- the steady state ---
+
+    def _settle_flow(self, flow: HeatedCycle) -> None:
+        """Temperature and flow in turn until neither changes, by Anderson's mixture of the last turns.
+
+        Gas that is heated from below turns over as a whole: one after the other, unmixed, they would never meet.
+        """
+        heat, mixed = self.heat, Anderson(self.strip.comm, self.strip.volume[: self.strip.owned], DEPTH)
+        exact = True
+        for _ in range(TURNS):
+            before = heat.excess
+            change = self.settle()
+            if change < SETTLED and exact:
+                return
+            low, high = within(self.strip.comm, [before, heat.excess])
+            heat.excess = np.clip(mixed.next(before, heat.excess, SHARE), low, high)
+            flow.density.take(heat.temperature)
+            exact = flow.find_again(exact=change < SETTLED)
+        raise ConvergenceError(
+            f"steady state: temperatures still change by {change:.3g} K after {TURNS} turns of flow and heat; the gas may have no steady "
+            "flow where it is heated from below: try fidelity averaged"
+        )
+
+    def settle(self) -> float:
+        """Take the temperatures that are steady in the present flow, with what reactions have given off in the second that is booked.
+
+        Returns the largest change [K]; collective. Raises ConvergenceError.
+        """
+        return self.heat.settle(self._steady_operator(), self.case.conveying_velocity, self._booked())
+
+    def book_second(self) -> None:
+        """Enter one second of the steady state; collective."""
+        self.heat.book_second(self._steady_operator(), self.case.conveying_velocity, self._booked())
+
+    def _steady_operator(self) -> HeatOperator:
+        return self.heat.operator(self.flow.mean(), self.gas, self.case.conveying_velocity)
+
+    def _booked(self) -> Floats:
+        """Heat of all reactions that are booked, in own cells [J/m]."""
+        ledger = self.transport.ledger
+        return self._heat_of(ledger.surface, ledger.gas)
+
+    # --- one step ---
+
+    def begin(self, step: Step, columns: int) -> FlowField:
+        """The bed has slid by so many `columns`: let density, flow and rates follow; the field of the step. Raises ConvergenceError."""
+        self.heat.slide(columns, self.gas)
+        self._before = self.gas
+        self.flow.follow(self.heat.temperature, step)
+        if self.gas is not self._before:
+            self.transport.follow(self.gas)
+        if self.flow.changed:
+            self._operators.clear()
+        ledger = self.transport.ledger
+        self._events = ledger.surface, ledger.gas
+        return self.flow.at(step)
+
+    def finish(self, field: FlowField, dt: float) -> None:
+        """Heat over `dt` [s] in the flow of the step, with what the reactions of the step have given off. Raises ConvergenceError."""
+        if field not in self._operators:
+            self._operators[field] = self.heat.operator(field, self.gas)
+        self.heat.advance(self._operators[field], self._before, self.gas, dt, self._given_off())
+
+    def _given_off(self) -> Floats:
+        """Heat of the reactions since `begin` in own cells [J/m]."""
+        ledger, (surface, gas) = self.transport.ledger, self._events
+        return self._heat_of(ledger.surface - surface, ledger.gas - gas)
+
+    def _heat_of(self, surface: Floats, gas: Floats) -> Floats:
+        """Of events (reactions, reactive cells) and (reactions, own cells) [mol/m], in own cells [J/m]."""
+        made = np.asarray(self._gas_heat) @ gas if self._gas_heat else np.zeros(self.strip.owned)
+        if self._surface_heat:
+            made[self.transport.coverage.cells] += np.asarray(self._surface_heat) @ surface
+        return np.asarray(made)
+
+    def memento(self) -> ThermalMemento:
+        """The present state of heat and gas."""
+        return ThermalMemento(self.heat.memento(), self.gas)
+
+    def recall(self, memento: ThermalMemento) -> None:
+        """Go back to a state of this run; the flow stays."""
+        self.heat.recall(memento.heat)
+        self.flow.density.gas = memento.gas
+        self.transport.follow(memento.gas)
+
+    # --- looking ---
+
+    def totals(self) -> HeatTotals:
+        """What has passed and what there is; collective."""
+        passed = self.heat.ledger.passed
+        return HeatTotals(
+            inlets=passed.inlets,
+            outlets=passed.outlets,
+            walls=passed.walls,
+            solids=passed.solids,
+            heating=passed.heating,
+            reaction=passed.reaction,
+            stored=self.heat.content(self.gas),
+            stored_initially=self._stored_initially,
+            gas_passed=passed.gas,
+            gas=gas_amount(self.strip, self.gas.relative),
+            gas_initially=self._gas_initially,
+        )
+
+    # --- restart ---
+
+    def stored(self) -> dict[str, dict[str, Any]]:
+        """Arrays of a restart state by part; collective."""
+        counts = {"heat": self._stored_initially, "gas": self._gas_initially}
+        return {"heat": self.heat.stored(), "heated": self.flow.stored(), "heat_initially": counts}
+
+    def restore(self, parts: dict[str, dict[str, Any]], steps: int) -> None:
+        """The inverse of `stored`, on every rank, after `steps`."""
+        self.heat.restore(parts["heat"])
+        self.flow.restore(parts["heated"], steps)
+        self._stored_initially = float(parts["heat_initially"]["heat"])
+        self._gas_initially = float(parts["heat_initially"]["gas"])
+        self._operators.clear()
+        self.transport.follow(self.gas)
