@@ -89,6 +89,13 @@ def gas_caveats(case: Case) -> list[str]:
         found.append(
             f"gas.viscosity is {gas.viscosity:.3g} Pa s, {state} has about {model.viscosity(gas.temperature):.3g} Pa s"
         )
+    if model is not None and case.energy is not None:
+        for key, value, usual, unit in (
+            ("heat_capacity", gas.heat_capacity, model.heat_capacity(gas.temperature), "J/kg/K"),
+            ("conductivity", gas.conductivity, model.conductivity(gas.temperature), "W/m/K"),
+        ):
+            if _apart(value, usual):
+                found.append(f"gas.{key} is {value:.3g} {unit}, {state} has about {usual:.3g} {unit}")
     told: dict[str, list[str]] = {}  # species of whom the same is to be said
     for species in case.mechanism.species:
         value = gas.diffusivity[species.name]

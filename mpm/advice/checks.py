@@ -13,6 +13,7 @@ from mpm.advice.caveats import (
     profile_caveats,
     steady_caveats,
 )
+from mpm.advice.heat import energy_report, heat_warnings
 from mpm.advice.idle import idle_keys
 from mpm.advice.limits import beyond_limits
 from mpm.advice.notes import notes
@@ -26,7 +27,6 @@ from mpm.motion.kinematics import Vibration
 from mpm.motion.schedule import Schedule
 from mpm.physics.conveying import perfect_flight_velocity, straight_drop_velocity
 from mpm.physics.fluidisation import (
-    mean_free_path,
     minimum_fluidisation_velocity,
     wen_yu_minimum_fluidisation,
 )
@@ -62,7 +62,7 @@ def check_case(case: Case) -> dict[str, Any]:
             "density": case.gas.density,
             "viscosity": case.gas.viscosity,
             "molar_mass": case.gas.molar_mass,
-            "mean_free_path": _free_path(case),
+            "mean_free_path": case.gas.mean_free_path,
             "diffusivity": dict(case.gas.diffusivity),
             "diffusivity_from": {
                 name: "scaled" if name in case.gas.scaled else "typed" for name in case.gas.diffusivity
@@ -83,6 +83,8 @@ def check_case(case: Case) -> dict[str, Any]:
     layer = case.geometry.moving_layer
     if layer is not None:
         report["bed"] = _bed(case, layer)
+    if case.energy is not None:
+        report["energy"] = energy_report(case, case.energy)
     report["origins"] = {value.name: value.origin for value in values(case)}
     report["notes"] = notes(case)
     report["without_effect"] = idle_keys(case)
@@ -104,16 +106,21 @@ def _strip(case: Case) -> dict[str, Any]:
     }
 
 
-def _free_path(case: Case) -> float:
-    gas = case.gas
-    return mean_free_path(
-        viscosity=gas.viscosity, pressure=gas.pressure, temperature=gas.temperature, molar_mass=gas.molar_mass
-    )
-
-
-def _pores(case: Case, material: Material) -> dict[str, float]:
-    diameter = eng.pore_diameter(material)
-    return {"diameter": diameter, "Knudsen": eng.knudsen(_free_path(case), diameter)}
+def _pores(case: Case, material: Material) -> dict[str, Any]:
+    diameter = material.pore_diameter or eng.pore_diameter(material)
+    numbers: dict[str, Any] = {
+        "diameter": diameter,
+        "Knudsen": eng.knudsen(case.gas.mean_free_path, diameter),
+    }
+    if material.pore_diameter is not None:
+        slipping = material.slip_permeability(case.gas.mean_free_path)
+        numbers["permeability_factor"] = slipping[1] / material.permeability[1]
+        numbers["diffusivity_factor"] = {
+            s.name: material.pore_diffusivity(free, s.molar_mass, case.gas.temperature) / free
+            for s in case.mechanism.species
+            if (free := case.gas.diffusivity[s.name]) > 0.0
+        }
+    return numbers
 
 
 def _motion(case: Case) -> dict[str, float | str | None]:
@@ -158,9 +165,10 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     mechanism, material = case.mechanism, layer.material
     met = coverage_met(mechanism, species, material.initial_coverage, gas.temperature) or {}
     k = uptake(mechanism, species, met, gas.temperature)
-    diffusivity = effective_diffusivity(
-        gas.diffusivity[species], material.porosity, material.tortuosity_factor[1]
+    molecular = material.pore_diffusivity(
+        gas.diffusivity[species], mechanism.get(species).molar_mass, gas.temperature
     )
+    diffusivity = effective_diffusivity(molecular, material.porosity, material.tortuosity_factor[1])
     velocity = eng.rising_velocity(case, inlet.center)
     surface = material.surface_to_volume
     numbers["species"] = species
@@ -190,11 +198,12 @@ def _bed(case: Case, layer: Layer) -> dict[str, Any]:
     rising = max(
         (eng.rising_velocity(case, i.center) for i in geometry.inlets if i.side == "bottom"), default=0.0
     )
+    permeability = material.slip_permeability(gas.mean_free_path)[1]
     numbers: dict[str, Any] = {
         "height": layer.height,
         "gas_velocity": rising,
         "spreading_length": eng.spreading_length(case),
-        "pressure_drop": gas.viscosity * rising * layer.height / material.permeability[1],
+        "pressure_drop": gas.viscosity * rising * layer.height / permeability,
     }
     if case.motion.mean_velocity != 0.0:
         numbers["residence_time"] = geometry.length / abs(case.motion.mean_velocity)
@@ -232,4 +241,5 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
         *steady_caveats(case),
         *output_caveats(case),
         *beyond_limits(case, report),
+        *heat_warnings(case, report),
     ]

@@ -87,8 +87,11 @@ def knudsen(free_path: float, diameter: float) -> float:
 
 def flow_resistance(case: Case) -> float:
     """Sum of h/k_y over the porous layers [1/m]: pressure drop over viscosity and superficial velocity (Darcy)."""
+    path = case.gas.mean_free_path
     return sum(
-        layer.height / layer.material.permeability[1] for layer in case.geometry.layers if layer.material
+        layer.height / layer.material.slip_permeability(path)[1]
+        for layer in case.geometry.layers
+        if layer.material
     )
 
 

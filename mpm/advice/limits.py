@@ -31,7 +31,7 @@ def beyond_limits(case: Case, report: dict[str, Any]) -> list[str]:
         *_fluidisation(report),
         *_particles(case),
         *_feeds(case),
-        *_slip(report),
+        *_slip(case, report),
         *_courant(case, report),
         *_smearing(case, report),
         *_stripes(case, report),
@@ -81,11 +81,12 @@ def _feeds(case: Case) -> Iterator[str]:
             )
 
 
-def _slip(report: dict[str, Any]) -> Iterator[str]:
-    """Pores in which gas is no continuum."""
+def _slip(case: Case, report: dict[str, Any]) -> Iterator[str]:
+    """Pores in which gas is no continuum and the case does not say how wide they are."""
+    told = {layer.name for layer in case.geometry.layers if layer.material and layer.material.pore_diameter}
     for name, pores in report["pores"].items():
         kn = pores["Knudsen"]
-        if kn > CONTINUUM:
+        if kn > CONTINUUM and name not in told:
             yield (
                 f"layer {name}: Kn = {kn:.2g}, mean free path {report['gas']['mean_free_path'] * 1e6:.2g} um over pores of "
                 f"{pores['diameter'] * 1e6:.3g} um: outside the continuum (Kn above {CONTINUUM:g}) gas slips at walls; "

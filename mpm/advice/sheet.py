@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from mpm.advice.heatsheet import heat_numbers, temperature_rows
 from mpm.case.case import Case
 from mpm.case.marks import Marked, value_text
 from mpm.case.ports import Inlet
@@ -21,6 +22,7 @@ def case_sheet(case: Case, report: dict[str, Any], marked: Marked) -> Sheet:
     _gas(sheet, case, report, marked)
     _ports(sheet, case, report, marked)
     _motion(sheet, case, report, marked)
+    temperature_rows(sheet, case, report, marked)
     _engineering(sheet, report)
     _cost(sheet, case, report, marked)
     return sheet
@@ -91,11 +93,17 @@ def _powders(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -
         ]
         sheet.add("share of the sites at first", ", ".join(covered))
         pores = report["pores"][layer.name]
-        if "diameter" in pores:
+        if material.pore_diameter is not None:
+            sheet.add("pores", f"{marked.text(f'material.{name}.pore_diameter')} wide")
+        elif "diameter" in pores:
             sheet.add("pores, as straight capillaries", number(pores["diameter"] * 1e6, "um wide"))
         if "Knudsen" in pores:
             kn = number(pores["Knudsen"], digits=3)
             sheet.add("Knudsen number of the pores", f"{kn} (gas is a continuum below 0.01)")
+        if "permeability_factor" in pores:
+            sheet.add("slip multiplies permeability by", number(pores["permeability_factor"]), part=True)
+            shares = [f"{name} {number(share)}" for name, share in pores["diffusivity_factor"].items()]
+            sheet.add("walls multiply diffusivity by", ", ".join(shares), part=True)
 
 
 def _gas(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
@@ -233,6 +241,7 @@ def _engineering(sheet: Sheet, report: dict[str, Any]) -> None:
         row("thickness of the reaction front", numbers.get("front_thickness"), "um", 1e6, True)
         row("lifetime of a site", numbers.get("site_lifetime"), "us", 1e6, True)
         row("lifetime in the gas", numbers.get("gas_lifetime"), "us", 1e6, True)
+    heat_numbers(sheet, report)
 
 
 def _cost(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 from pydantic_core import PydanticCustomError
 
 from mpm.case.model import Flag, Frozen
-from mpm.physics.thermal import ConductivityModel
+from mpm.physics.thermal import ConductivityModel, effective_conductivity
 from mpm.units import FlowUpdate, Temperature, reject, worked_out
 
 if TYPE_CHECKING:
+    from mpm.arrays import Floats
     from mpm.case.geometry import Geometry
     from mpm.case.layers import Layer
+    from mpm.case.materials import Material
     from mpm.physics.mechanism import Mechanism
 
 NEEDED = {
@@ -37,6 +39,19 @@ class Energy(Frozen):
     """whether weight and the reactor's acceleration act on differences of the gas's density"""
     soret: Flag = False
     """whether species also diffuse along gradients of temperature"""
+
+    def model_of(self, material: Material) -> str:
+        """Where the conductivity of a layer comes from: `given` (its effective_conductivity), or the model."""
+        return self.conductivity_model if material.effective_conductivity is None else "given"
+
+    def conductivity_of[Value: (float, Floats)](self, material: Material, gas: Value) -> Value:
+        """Conductivity [W/m/K] of a porous solid full of gas that conducts `gas` [W/m/K] at the temperatures in question."""
+        if material.effective_conductivity is not None:
+            return material.effective_conductivity + 0.0 * gas  # in the shape of `gas`
+        if material.conductivity is None:
+            raise ValueError("a material without conductivity")  # the case refuses it
+        solid, porosity = material.conductivity + 0.0 * gas, material.porosity + 0.0 * gas
+        return effective_conductivity(self.conductivity_model, porosity, gas, solid)
 
     def complete(self, temperature: float) -> None:
         """Fill in what is left out; the case does this once the gas is read."""

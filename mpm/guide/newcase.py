@@ -66,10 +66,10 @@ def new_case(case: Case, folder: Path) -> str:
     """The commented text of `case` for a file in `folder`.
 
     What is typed in the case or comes from its shared geometry is active, and whatever else it takes for the text to give an equal case
-    (a dose window that the case writes in another way).
+    (a dose window that the case writes in another way); of [energy], whose presence says something, all.
     """
     found = values(case)
-    active = {value.path for value in found if value.origin in ("typed", "base")}
+    active = {v.path for v in found if v.origin in ("typed", "base") or v.path[0] == "energy"}
     while True:
         text = "\n".join([_HEAD, *_Writer(case, found, active, folder).table("", ())]) + "\n"
         again = {

@@ -68,6 +68,18 @@ def carrier_ratio(species: Species, carrier: str, molar_mass: float) -> float | 
     )
 
 
+def thermal_diffusion(molar_mass: float, carrier_molar_mass: float, temperature: float) -> float:
+    """S [mol/m/s] of a dilute species: its molar flux is -x_i S grad ln T (Soret), above 0 for what is heavier than the carrier.
+
+    S = D_T,i/(M_i x_i) with D_T,i = -2.59e-7 T^0.659 [a_i X_i/sum a X - Y_i] [sum a X/sum b X] kg/m/s, a = M^0.511, b = M^0.489 with M in
+    g/mol: Kuo, Principles of Combustion (1986), as the solver of the thesis has it (5-13). For X_i -> 0 the brackets become
+    [(M_i/M)^0.511 - M_i/M] X_i and M^0.022.
+    """
+    ratio = molar_mass / carrier_molar_mass
+    bracket = (math.pow(ratio, 0.511) - ratio) * math.pow(1e3 * carrier_molar_mass, 0.022)
+    return -2.59e-7 * math.pow(temperature, 0.659) * bracket / molar_mass
+
+
 def scaled_diffusivity(
     species: Species, carrier: str, *, molar_mass: float, temperature: float, pressure: float
 ) -> float:

@@ -30,7 +30,7 @@ def effective_conductivity[Value: (float, Floats)](
 ) -> Value:
     """k_eff [W/m/K] of a porous solid full of gas that does not flow.
 
-    parallel (upper bound; the thesis, 5-9)    eps k + (1 - eps) k_s
+    parallel (upper bound; the thesis, 5-11)   eps k + (1 - eps) k_s
     series (lower bound)                       1/(eps/k + (1 - eps)/k_s)
     geometric                                  k^eps k_s^(1 - eps)
     zehner_bauer_schluender                    of packed spheres that touch in points: `zehner_schluender`
