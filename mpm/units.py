@@ -282,9 +282,7 @@ MolarEnergy = Annotated[float, Dimension("J/mol", "an activation energy", "20 kJ
 MolarEnthalpy = Annotated[float, Dimension("J/mol", "an enthalpy", "-86.5 kJ/mol")]
 MolarHeatCapacity = Annotated[float, Dimension("J/mol/K", "a molar heat capacity", "35.7 J/mol/K", above=0.0)]
 HeatFlux = Annotated[float, Dimension("W/m^2", "a heat flux", "1 kW/m^2")]
-HeatTransfer = Annotated[
-    float, Dimension("W/m^2/K", "a heat transfer coefficient", "10 W/m^2/K", at_least=0.0)
-]
+HeatTransfer = Annotated[float, Dimension("W/m^2/K", "a heat transfer coefficient", "10 W/m^2/K", above=0.0)]
 Heating = Annotated[float, Dimension("W/m^3", "a heating by volume", "1e5 W/m^3")]
 FlowUpdate = Annotated[float, Dimension("", "a relative change", "0.01", above=0.0, below=1.0)]
 HeatCapacity = Annotated[float, Dimension("J/kg/K", "a heat capacity", "871 J/kg/K", above=0.0)]

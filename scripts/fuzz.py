@@ -95,6 +95,36 @@ diffusivity = { TMA = "2e-5 m^2/s", default = "1e-5 m^2/s" }
 sticking = 0.01
 Ea = "20 kJ/mol"
 """
+HEATED = (
+    GEOMETRY
+    + """[[geometry.wall]]
+side = "bottom"
+end = "7 mm"
+temperature = "200 degC"
+[[geometry.wall]]
+name = "roof"
+side = "top"
+end = "12 mm"
+heat_transfer_coefficient = "10 W/m^2/K"
+ambient = "300 K"
+[material.glass_beads]
+effective_conductivity = "0.2 W/m/K"
+pore_diameter = "23 um"
+[gas]
+conductivity = "0.0454 W/m/K"
+heat_capacity = "1040 J/kg/K"
+[chemistry.reaction.tma]
+heat_of_reaction = "-140 kJ/mol"
+[chemistry.species.TMA]
+enthalpy = "-86.5 kJ/mol"
+heat_capacity = "155 J/mol/K"
+[energy]
+initial_temperature = "25 degC"
+conductivity_model = "zehner_bauer_schluender"
+flow_update = 0.02
+buoyancy = false
+"""
+)
 FILE_PROFILE = GEOMETRY + '[motion]\nprofile = "profile.csv"\n[time]\nend = "1 s"\nstep = "5 ms"\n'
 SWEEPS = (
     """[sweep]
@@ -289,7 +319,7 @@ def read_data(folder: Path) -> None:
 KINDS = {
     kind.name: kind
     for kind in (
-        Kind("case", (GEOMETRY, OVER_BASE, FILE_PROFILE, "example"), "case.toml", read_case),
+        Kind("case", (GEOMETRY, OVER_BASE, HEATED, HEATED, FILE_PROFILE, "example"), "case.toml", read_case),
         Kind("sweep", SWEEPS, "sweep.toml", read_sweep_file),
         Kind("powder", POWDERS, "powder.toml", read_powder),
         Kind("mechanism", (TITANIA, "alumina"), "mechanism.toml", read_mechanism),

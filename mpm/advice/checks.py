@@ -143,10 +143,8 @@ def _motion(case: Case) -> dict[str, float | str | None]:
 
 
 def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
-    gas, layer = case.gas, case.geometry.moving_layer
-    standard = eng.standard_flow(
-        inlet.velocity * inlet.width, temperature=gas.temperature, pressure=gas.pressure
-    )
+    gas, layer, temperature = case.gas, case.geometry.moving_layer, case.inlet_temperature(inlet)
+    standard = eng.standard_flow(inlet.velocity * inlet.width, temperature=temperature, pressure=gas.pressure)
     numbers: dict[str, Any] = {
         "velocity": inlet.velocity,
         "flow": inlet.velocity * inlet.width,
@@ -154,7 +152,10 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
         "sccm_per_metre": eng.per_minute(standard),
         "mole_fractions": mole_fractions(case.mechanism, gas.molar_mass, inlet.mass_fractions),
         "Re": eng.reynolds(
-            density=gas.density, velocity=inlet.velocity, length=inlet.width, viscosity=gas.viscosity
+            density=gas.density * case.inlet_density(inlet),
+            velocity=inlet.velocity,
+            length=inlet.width,
+            viscosity=gas.viscosity_at(temperature),
         ),
         "concentrations": case.feed_concentrations(inlet.mass_fractions),
     }

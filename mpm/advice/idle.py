@@ -124,10 +124,11 @@ def _of_energy(case: Case) -> Idle:
                 yield from ((f"chemistry.{table}.{name}.{key}", _ISOTHERMAL) for key in HEATS if key in typed)
         return
     if case.fidelity == "steady":
-        why = "a steady state has no time"
-        yield from _typed(case.energy, "energy", ["flow_update"], why)
+        yield from _typed(
+            case.energy, "energy", ["flow_update"], "a steady flow is that of its own temperatures"
+        )
         if case.energy.initial_temperature != case.gas.temperature:
-            yield "energy.initial_temperature", why
+            yield "energy.initial_temperature", "a steady state has no time"
     geometry = case.geometry
     if case.bed_temperature != case.gas.temperature and (
         case.conveying_velocity == 0.0 or geometry.bed_inflow == "periodic"

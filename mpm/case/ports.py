@@ -109,7 +109,7 @@ class Inlet(Port):
     side: Literal["bottom", "top"] = "bottom"
     """the wall that the inlet is in"""
     velocity: Speed = 0.035
-    """speed of the gas through the inlet, at the reactor's temperature and pressure; 0: closed"""
+    """speed of the gas through the inlet, at the temperature of what it blows and the reactor's pressure; 0: closed"""
     mass_fractions: dict[str, Fraction] = Field({}, examples=[{"TMA": 2e-4}])
     """mass fraction of each precursor in the gas of this inlet while it doses; left out: carrier gas alone (a purge)"""
     temperature: Temperature | None = worked_out("gas.temperature", None, example="300 K")

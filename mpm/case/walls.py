@@ -83,12 +83,12 @@ def name_walls(geometry: Any) -> Any:
     walls = geometry.get("wall") if isinstance(geometry, Mapping) else None
     if not isinstance(walls, list) or all(not isinstance(w, Mapping) or "name" in w for w in walls):
         return geometry
-    taken = {wall.get("name") for wall in walls if isinstance(wall, Mapping)}
+    taken = {str(wall.get("name")) for wall in walls if isinstance(wall, Mapping)}
     named = []
     for wall in walls:
         if isinstance(wall, Mapping) and "name" not in wall:
-            side = wall.get("side") if wall.get("side") in SIDES else "wall"
-            name = next(n for n in _numbered(str(side)) if n not in taken)
+            side = str(wall.get("side"))
+            name = next(n for n in _numbered(side if side in SIDES else "wall") if n not in taken)
             taken.add(name)
             wall = {"name": name, **wall}
         named.append(wall)
