@@ -34,7 +34,9 @@ def _files(number: Quantity) -> str:
 def _row(number: Quantity) -> str:
     words = quantity(number.name)
     unit = "" if number.unit == RATIO else superscript(number.unit)
-    steady = f"{unit} (steady: {unit}/s)" if number.rate else unit
+    steady = (
+        f"{unit} (steady: {superscript(quantity(number.name, steady=True).unit)})" if number.rate else unit
+    )
     meaning = f"{words.label}: {words.meaning}".replace("|", "\\|").replace("<", "&lt;")
     return f"| `{number.name}` | {steady} | {meaning} | {_files(number)} |"
 

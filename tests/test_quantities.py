@@ -20,18 +20,19 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def results() -> dict[str, Result]:
-    """A zone and a cycle in time, and the cycle's steady state."""
+    """A zone and a cycle in time, the cycle's steady state, and a zone that cold powder enters."""
     coarse = {**COARSE, "geometry.cell_width": "4 mm"}
     short = {**coarse, "time.end": "0.3 s", "time.step": "0.1 s"}
     cases = {
         "zone": load_case("single_zone", short),
         "cycle": load_case("single_cycle", short),
         "steady": load_case("single_cycle", {**coarse, "fidelity": "steady"}),
+        "warm": load_case("single_zone", {**short, "energy": {}, "geometry.bed_temperature": "25 degC"}),
     }
     return {name: Reactor(case).run() for name, case in cases.items()}
 
 
-@pytest.mark.parametrize("run", ["zone", "cycle", "steady"])
+@pytest.mark.parametrize("run", ["zone", "cycle", "steady", "warm"])
 def test_every_number_of_a_run_is_in_the_table(results: dict[str, Result], run: str) -> None:
     """Fails when summary.json or history.csv hold a number without an entry, or with one that knows of another file only."""
     held = {"summary.json": list(flatten(results[run].summary)), "history.csv": list(results[run].history)}
@@ -48,7 +49,7 @@ def test_every_entry_of_the_table_is_reported(results: dict[str, Result]) -> Non
     assert [number.name for number in QUANTITIES if number.name not in given] == []
 
 
-@pytest.mark.parametrize("run", ["zone", "cycle", "steady"])
+@pytest.mark.parametrize("run", ["zone", "cycle", "steady", "warm"])
 def test_the_report_page_tells_every_number(results: dict[str, Result], run: str) -> None:
     """Fails when a section has no heading that the page knows: its numbers would be in the files and on no page."""
     summary = results[run].summary

@@ -1,4 +1,4 @@
-"""Balances of species, sites and elements, and whether a run may call its numbers done: all of them within LIMIT.
+"""Balances of species, sites, elements, heat and gas, and whether a run may call its numbers done: all of them within LIMIT.
 
 Amounts are per metre of depth.
 """
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mpm.errors import BalanceError
+from mpm.report.heat import heat_and_gas
 from mpm.report.records import Totals, running_gas, running_surface
 
 if TYPE_CHECKING:
@@ -138,9 +139,9 @@ def film_made(case: Case, totals: Totals) -> dict[str, float]:
 
 
 def balance_errors(case: Case, totals: Totals) -> dict[str, float]:
-    """Of every species by its name, and of the `sites`."""
+    """Of every species by its name, of the `sites`, and with `[energy]` of the heat (`energy`) and the `gas`."""
     errors = {name: entry["balance_error"] for name, entry in species_balances(case, totals).items()}
-    return errors | {"sites": site_balance(case, totals)}
+    return errors | {"sites": site_balance(case, totals), **heat_and_gas(case, totals)}
 
 
 def worst_balance(case: Case, totals: Totals) -> tuple[str, float]:

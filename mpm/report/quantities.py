@@ -16,15 +16,21 @@ from mpm.report.coating import film, titration, utilisation
 from mpm.report.dosing import dose_ratios, excess_numbers
 from mpm.report.fronts import fronts
 from mpm.report.gas import contamination, cvd, cvd_totals, outlet_gas
+from mpm.report.heat import energy, flow_and_gas, heating_length, temperatures
 from mpm.report.quantity import RATIO, Quantity, Section
 from mpm.report.records import run_itself
 
 _AMOUNT = "mol/m"
+_HEAT = "J/m"
+_PER_SECOND = {_HEAT: "W/m"}
+"""Units that have a name of their own per second."""
 _DEPTH = "per metre of depth of the reactor (the model is plane)"
 _DOSED = "What was dosed, what was used"
 _ASTRAY = "Parasitic growth and precursor astray"
 COST = "Time and cost"
-HEADINGS = ("What leaves coated", _DOSED, _ASTRAY, "Film", "Gas flow", "Gas in the outlets", "Fronts", COST)
+HEADINGS = (
+    "What leaves coated", _DOSED, _ASTRAY, "Film", "Temperature", "Heat", "Gas flow", "Gas in the outlets", "Fronts", COST
+)  # fmt: skip
 """Of the sections, in the order in which people ask."""
 FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film")
 """Sections that are offered before all others, or alone, where there is little room."""
@@ -117,16 +123,48 @@ SECTIONS = (
             "on the particles of the moving layer, per particle surface that has been conveyed meanwhile", "umol/m^2"),
         Quantity("film.<film>.thickness", "thickness of the {film} film", "m", "growth per surface times molar mass over density", "nm"),
     ), since_output=True),
+    Section("temperature", "Temperature", lambda r: temperatures(r.case, r.grid, r.state.temperature), (
+        Quantity("temperature.bed_exit", "temperature of the powder that leaves", "K",
+            "mean over the height of the moving layer, in the column at the end of the strip where solids leave it"),
+        Quantity("temperature.<layer>.mean", "temperature of {layer}, mean", "K", "of gas and solids now, mean over its volume"),
+        Quantity("temperature.<layer>.min", "temperature of {layer}, lowest", "K", "of gas and solids now, in the coldest cell"),
+        Quantity("temperature.<layer>.max", "temperature of {layer}, highest", "K", "of gas and solids now, in the hottest cell"),
+    )),
+    Section("heating", "Temperature", lambda r: heating_length(r.case, r.grid, r.state.temperature), (
+        Quantity("heating.length", "way of the powder until it is warm", "m",
+            "distance from the end where solids enter to where the bed, mean over its height, has made 95 % of its way from the "
+            "temperature at which it enters to that at which it leaves", "mm"),
+    )),
+    Section("energy", "Heat", lambda r: energy(r.case, r.totals.heat), (
+        Quantity("energy.inlets", "heat from inlets", _HEAT,
+            f"what the gas that is fed carries more than at gas.temperature; below 0: less, {_DEPTH}", rate=True),
+        Quantity("energy.outlets", "heat from outlets", _HEAT,
+            f"what the gas that they draw back in carries more than at gas.temperature, less what leaves; below 0: lost, {_DEPTH}",
+            rate=True),
+        Quantity("energy.walls", "heat from walls", _HEAT, f"by conduction through all walls; below 0: lost, {_DEPTH}", rate=True),
+        Quantity("energy.solids", "heat from solids", _HEAT,
+            f"what those that enter carry more than at gas.temperature, less what leaves with others; below 0: lost, {_DEPTH}",
+            rate=True),
+        Quantity("energy.reaction", "heat of reaction", _HEAT, f"what reactions gave off, {_DEPTH}", rate=True),
+        Quantity("energy.heating", "electrical heat", _HEAT, f"what geometry.layer.<name>.heating gave, {_DEPTH}", rate=True),
+        Quantity("energy.stored", "heat stored in gas and solids", _HEAT,
+            f"what the strip holds at the end, less what it held at the start, {_DEPTH}", rate=True),
+        Quantity("energy.balance_error", "balance error of heat", RATIO,
+            "inlets + outlets + walls + solids + reaction + heating - stored, over the largest of them", error=True),
+    )),
     Section("balance", "", lambda r: balance_errors(r.case, r.totals), (
         Quantity("balance.<species>", "balance error of {species}", RATIO,
-            "residual over the largest of the terms; `sites`: of the surface sites", error=True),
+            "residual over the largest of the terms; `sites`: of the surface sites; with `[energy]` also `energy` and `gas`", error=True),
     ), summary=False),
-    Section("flow", "Gas flow", lambda r: r.flow, (  # mpm.flow.numbers
+    Section("flow", "Gas flow", flow_and_gas, (  # mpm.flow.numbers
         Quantity("flow.inflow", "gas fed by all inlets", "m^2/s", f"volume flow {_DEPTH}", "cm^2/s"),
         Quantity("flow.outflow", "gas let out by all outlets", "m^2/s", f"volume flow {_DEPTH}", "cm^2/s"),
         Quantity("flow.outlets.<outlet>", "gas let out by {outlet}", "m^2/s",
             f"volume flow {_DEPTH}, less what the outlet draws back in", "cm^2/s"),
-        Quantity("flow.mass_error", "mismatch of inflow and outflow", RATIO, "difference of the two over the inflow", error=True),
+        Quantity("flow.mass_error", "mismatch of inflow and outflow", RATIO,
+            "difference of the two over the inflow; with `[energy]` in a steady state only, since gas that warms leaves", error=True),
+        Quantity("flow.gas_balance_error", "balance error of the gas", RATIO,
+            "gas fed - left - stored, over what the strip holds or has let out, whichever is most; of cases with `[energy]`", error=True),
         Quantity("flow.bed_superficial_velocity.0", "superficial gas velocity in the bed, along", "m/s",
             "mean over the moving layer and the cycle, relative to the reactor", "cm/s"),
         Quantity("flow.bed_superficial_velocity.1", "superficial gas velocity in the bed, upwards", "m/s",
@@ -205,15 +243,19 @@ def quantity(name: str, steady: bool = False) -> Quantity:
     if match is None:
         return Quantity(name, name, RATIO, "")
     found, parts = match
-    per = "/s" if steady and found.rate else ""
+    rate = steady and found.rate
     return replace(
         found,
         name=name,
         label=found.label.format(**parts),
-        unit=found.unit + per,
+        unit=_per_second(found.unit) if rate else found.unit,
         meaning=found.meaning.format(**parts),
-        shown=found.shown + per if found.shown else "",
+        shown=_per_second(found.shown) if rate and found.shown else found.shown,
     )
+
+
+def _per_second(unit: str) -> str:
+    return _PER_SECOND.get(unit, f"{unit}/s")
 
 
 def entry(name: str) -> Quantity | None:

@@ -30,7 +30,7 @@ def natural_scale(name: str, numbers: Mapping[str, float]) -> float:
 
     Amounts [mol/m]: the largest feed of a species. Rates per volume: that feed per second, spread over a square metre of strip (none is as
     large). Growth per surface and thickness: 1 umol/m2, 1 nm. Flows, velocities and pressure drops of the gas: the largest of their kind.
-    Shares, coverages and mole fractions: 1; shares of a CVD that is itself 0 mean nothing. Lengths: 1 m.
+    Shares, coverages and mole fractions: 1; shares of a CVD that is itself 0 mean nothing. Lengths: 1 m. Temperatures: 1 K.
     """
     kind, last = name.split(".")[0], name.split(".")[-1]
     feed = max((value for key, value in numbers.items() if _is_feed(key)), default=0.0)
@@ -41,6 +41,8 @@ def natural_scale(name: str, numbers: Mapping[str, float]) -> float:
         return math.inf if rate <= ROUNDING * natural_scale("cvd.rate_mean", numbers) else 1.0
     if kind in ("species", "film", "cvd"):
         return {"per_area": 1e-6, "thickness": 1e-9}.get(last, feed)
+    if kind == "energy":
+        return max([abs(value) for key, value in numbers.items() if _is_heat(key)], default=0.0)
     if kind == "flow":
         unit = quantity(name).unit
         alike = (v for key, v in numbers.items() if key.startswith("flow.") and quantity(key).unit == unit)
@@ -50,3 +52,7 @@ def natural_scale(name: str, numbers: Mapping[str, float]) -> float:
 
 def _is_feed(name: str) -> bool:
     return name.startswith("species.") and name.endswith(".fed")
+
+
+def _is_heat(name: str) -> bool:
+    return name.startswith("energy.") and not quantity(name).error
