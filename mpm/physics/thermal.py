@@ -18,7 +18,7 @@ MODELS: tuple[ConductivityModel, ...] = ("parallel", "series", "geometric", "zeh
 
 CRITICAL_RAYLEIGH = 1707.762
 """Ra at which a layer between rigid plates, heated from below, begins to turn over (Chandrasekhar, Hydrodynamic and Hydromagnetic
-Stability, 1961, table I)."""
+Stability, 1961, chapter II)."""
 CRITICAL_DARCY_RAYLEIGH = 4.0 * math.pi**2
 """The same of a porous layer between impermeable plates (Horton and Rogers 1945, Lapwood 1948)."""
 _NEAR = 0.05
