@@ -9,6 +9,7 @@ import pytest
 from mpm.advice.checks import check_case
 from mpm.advice.idle import idle_keys
 from mpm.advice.screen import print_report
+from mpm.advice.sketch import ASCII, BOXES, sketch
 from mpm.case.case import Case, build_case, load_case
 from mpm.case.keys import values
 from mpm.case.sources import built_in_files, parse_toml
@@ -403,3 +404,16 @@ def test_the_example_of_the_documents_is_a_case() -> None:
     case = build_case(parse_toml(example, "document"), {}, Path(), "document")
     assert [wall.name for wall in case.geometry.walls] == ["bottom", "roof"]
     assert case.energy is not None and case.temperatures == (298.15, 300.0, 473.0, 473.15)
+
+
+def test_the_sketch_shows_walls_that_give_or_take_heat() -> None:
+    """Fails when such a wall is drawn as any other, in either set of characters, or one at an end is not named."""
+    case = zone(
+        {"side": "bottom", "end": "32.925 mm", **HOT}, {"side": "right", **HOT}, geometry__periodic=False
+    )
+    for pen, line in ((BOXES, "━"), (ASCII, "=")):
+        lines = sketch(case, 80, pen)
+        (floor,) = (text for text in lines if text.count(line) > 3)
+        assert floor[1:19] == line * 18 and floor.count(line) == 18
+        assert f"{line * 3}: walls that give or take heat; heat passes the right" in lines[-1]
+    assert not any("heat" in text for text in sketch(load_case("single_zone"), 80))

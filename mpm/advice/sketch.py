@@ -38,6 +38,7 @@ class Pen:
     down: str
     left: str
     right: str
+    heated: str  # a wall that gives or takes heat
 
 
 BOXES = Pen(
@@ -51,6 +52,7 @@ BOXES = Pen(
     down="↓",
     left="←",
     right="→",
+    heated="━",
 )
 ASCII = Pen(
     across="-",
@@ -63,6 +65,7 @@ ASCII = Pen(
     down="v",
     left="<",
     right=">",
+    heated="=",
 )
 
 
@@ -80,8 +83,7 @@ def sketch(case: Case, width: int, pen: Pen = BOXES) -> list[str]:
     inner = max(width, NARROWEST) - 2
     geometry = case.geometry
     ports: tuple[Inlet | Outlet, ...] = (*geometry.inlets, *geometry.outlets)
-    top = _side(case, [port for port in ports if port.side == "top"], inner, pen)
-    bottom = _side(case, [port for port in ports if port.side == "bottom"], inner, pen)
+    top, bottom = _side(case, "top", ports, inner, pen), _side(case, "bottom", ports, inner, pen)
     side = pen.open_end if geometry.periodic else pen.wall
     lines = [*reversed(top.names), pen.corners[0] + top.wall + pen.corners[1]]
     for index, layer in enumerate(reversed(geometry.layers)):
@@ -90,7 +92,7 @@ def sketch(case: Case, width: int, pen: Pen = BOXES) -> list[str]:
         lines += [side + text + side for text in _layer(case, layer, inner, pen)]
     lines += [pen.corners[2] + bottom.wall + pen.corners[3], *bottom.names, _scale(case, inner)]
     lines += _zones(case, inner)
-    for text in (top.legend, bottom.legend, _ends(case)):
+    for text in (top.legend, bottom.legend, _ends(case), _heated(case, pen)):
         lines += lines_of(text, inner + 2, indent=1)
     return [line.rstrip() for line in lines]
 
@@ -102,6 +104,14 @@ def _ends(case: Case) -> str:
     return "ends (dotted): periodic, gas leaving at the right comes back at the left"
 
 
+def _heated(case: Case, pen: Pen) -> str:
+    """What the lines of heated walls are, and such walls at the ends."""
+    sides = {wall.side: wall.horizontal for wall in case.geometry.walls}
+    lines = f"{pen.heated * 3}: walls that give or take heat" if any(sides.values()) else ""
+    ends = " and ".join(side for side, across in sides.items() if not across)
+    return "; ".join(text for text in (lines, f"heat passes the {ends}" if ends else "") if text)
+
+
 @dataclass(frozen=True)
 class _Side:
     """A wall with its ports: the wall's line, the rows of names counted from the wall, what numbers stand for."""
@@ -111,15 +121,18 @@ class _Side:
     legend: str = ""
 
 
-def _side(case: Case, ports: Sequence[Inlet | Outlet], inner: int, pen: Pen) -> _Side:
+def _side(case: Case, side: str, all_ports: Sequence[Inlet | Outlet], inner: int, pen: Pen) -> _Side:
     wall = [pen.across] * inner
-    ports = sorted(ports, key=lambda port: port.center)
+    for heated in (w for w in case.geometry.walls if w.side == side):
+        first, last = _columns(case, heated.start, heated.end, inner)
+        wall[first : last + 1] = [pen.heated] * (last + 1 - first)
+    ports = sorted((port for port in all_ports if port.side == side), key=lambda port: port.center)
     for port in ports:
         inwards = pen.up if port.side == "bottom" else pen.down
         outwards = pen.down if port.side == "bottom" else pen.up
-        first, last = _columns(case, port, inner)
+        first, last = _columns(case, port.x0, port.x1, inner)
         wall[first : last + 1] = [inwards if isinstance(port, Inlet) else outwards] * (last + 1 - first)
-    places = [sum(_columns(case, port, inner)) // 2 for port in ports]
+    places = [sum(_columns(case, port.x0, port.x1, inner)) // 2 for port in ports]
     texts = [_port_text(case, port) for port in ports]
     names = _names(places, texts, inner, pen)
     if names is not None:
@@ -130,11 +143,11 @@ def _side(case: Case, ports: Sequence[Inlet | Outlet], inner: int, pen: Pen) -> 
     return _Side("".join(wall), _row_of_numbers(places, numbers, inner), f"ports {where}: {legend}")
 
 
-def _columns(case: Case, port: Inlet | Outlet, inner: int) -> tuple[int, int]:
-    """First and last character of a port, at least one."""
+def _columns(case: Case, x0: float, x1: float, inner: int) -> tuple[int, int]:
+    """First and last character of a port or wall from `x0` to `x1` [m], at least one."""
     scale = inner / case.geometry.length
-    first = min(max(int(port.x0 * scale), 0), inner - 1)
-    return first, min(max(round(port.x1 * scale) - 1, first), inner - 1)
+    first = min(max(int(x0 * scale), 0), inner - 1)
+    return first, min(max(round(x1 * scale) - 1, first), inner - 1)
 
 
 def _port_text(case: Case, port: Inlet | Outlet) -> str:
