@@ -34,8 +34,8 @@ class Density:
     `changed` tells whether the density is another one than in the step before, `source` (own,) [m2/s] is what flows out of each cell then.
     """
 
-    def __init__(self, case: Case, strip: Strip, temperature: Floats):
-        self.case, self.strip = case, strip
+    def __init__(self, case: Case, strip: Strip, temperature: Floats, same: float = SAME):
+        self.case, self.strip, self._same = case, strip, same
         self.gas = GasState.of(case, strip, temperature)
         self._amount = gas_amount(strip, self.gas.relative)
         self.changed = False
@@ -46,7 +46,7 @@ class Density:
         new = GasState.of(self.case, self.strip, temperature, self._amount)
         own = slice(0, self.strip.owned)
         moved = np.abs(new.relative[own] / self.gas.relative[own] - 1.0).max(initial=0.0)
-        self.changed = bool(largest(self.strip.comm, [moved])[0] > SAME)
+        self.changed = bool(largest(self.strip.comm, [moved])[0] > self._same)
         self.source = np.zeros(self.strip.owned)
         if self.changed:
             lost = self.gas.relative[own] - new.relative[own]

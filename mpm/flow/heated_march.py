@@ -28,7 +28,8 @@ class HeatedMarch:
     ):
         self.case, self.strip, self.bed_motion, self.schedule = case, strip, bed_motion, schedule
         self._update = 0.0 if case.energy is None else case.energy.flow_update
-        self.density = Density(case, strip, temperature)
+        # every step is solved for anyway, and what is about to turn over grows from nothing
+        self.density = Density(case, strip, temperature, same=0.0)
         self.found_in = self.density.gas
         self._problems: dict[float, FlowProblem] = {}
         self.current = self._problem(schedule.step(0)).field()

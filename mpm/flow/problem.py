@@ -33,6 +33,7 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.constants import GRAVITY
 from mpm.flow.convection import Convection
+from mpm.flow.courant import driving_speed
 from mpm.flow.fields import FlowField
 from mpm.flow.forms import FlowForms
 from mpm.flow.given import port_fields, spreading
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from mpm.flow.state import GasState
 
 STEADY = float("inf")  # s, the time step without inertia
+STILL = 1e-10  # of the speed that ports, motion and buoyancy could give: gas that moves no faster is at rest, but for rounding
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
 PortState = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
 CLOSED_PORTS: PortState = (0.0, 0.0)
@@ -246,7 +248,8 @@ class FlowProblem:
             self._iterate(STEADY, tolerance)
         self._adopt()
         change = self.space.fastest(self._work.array)
-        change, fastest = largest(self.strip.comm, [change, self.space.fastest(self.values)])
+        fastest = max(self.space.fastest(self.values), STILL * driving_speed(self.case))
+        change, fastest = largest(self.strip.comm, [change, fastest])
         return float(change / fastest) if fastest > 0.0 else 0.0
 
     def decayed(self, change: Floats, time: float, tolerance: float) -> Floats:
