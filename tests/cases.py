@@ -14,6 +14,7 @@ from mpm.mesh.strip import Strip
 from mpm.parallel import largest
 from mpm.reactor.reactor import Reactor, Result
 from mpm.report.balances import element_balances, site_balance, species_balances
+from mpm.report.records import HeatTotals
 
 from mpi4py import MPI as MPI  # isort: skip  (after mpm.numerics.fem)
 
@@ -78,8 +79,9 @@ def column_case(
 def assert_laws(reactor: Reactor) -> None:
     """Assert what holds in every run at any time; collective, and usable as the callback of a run.
 
-    Species, sites and elements balance to 1e-9; no concentration lies below -1e-14 of the feed; coverages lie in [0, 1] and sum to 1;
-    div u of any cell is below 1e-10 of the inflow, in every velocity field in use; what flows in flows out.
+    Species, sites and elements balance to 1e-9; no concentration lies below -1e-14 of the feed; coverages lie in [0, 1] and sum to 1; div u
+    of any cell is below 1e-10 of the inflow, in every velocity field in use; what flows in flows out. With heat, heat closes to 1e-9 of its
+    largest term and the gas itself to 1e-12.
     """
     case, comm, strip = reactor.case, reactor.comm, reactor.system.strip
     totals = reactor.totals()
@@ -98,6 +100,9 @@ def assert_laws(reactor: Reactor) -> None:
     )
     np.testing.assert_allclose(theta.sum(axis=0), 1.0, rtol=0.0, atol=1e-11)
 
+    if totals.heat is not None:
+        assert_heat_balances(reactor)
+        return  # gas that is heated flows apart
     sequence = reactor.flow.sequence
     fields = [reactor.system.velocity]
     if isinstance(sequence, CyclicFlow):
@@ -106,6 +111,43 @@ def assert_laws(reactor: Reactor) -> None:
         assert_free_of_divergence(case, strip, field)
         flows = boundary_flows(case, strip, face_flow(strip, field.velocities))
         assert abs(sum(flows.values())) <= 1e-10 * flow_scale(case, strip, field), f"port flows {flows}"
+
+
+def heat_of(reactor: Reactor) -> HeatTotals:
+    """What heat has passed in a run with [energy]; collective."""
+    heat = reactor.totals().heat
+    assert heat is not None
+    return heat
+
+
+def assert_heat_balances(reactor: Reactor) -> None:
+    """Assert that heat closes to 1e-9 of its largest term and the gas to 1e-12; collective, and usable as the callback of a run."""
+    heat = heat_of(reactor)
+    terms = [*heat.inlets, *heat.outlets, *heat.walls, heat.solids, heat.heating, heat.reaction]
+    stored = heat.stored - heat.stored_initially
+    residual, scale = sum(terms) - stored, max(map(abs, [*terms, stored, 1e-6]))
+    assert abs(residual) <= 1e-9 * scale, (
+        f"t = {reactor.time:g} s: heat off by {residual / scale:.2g}, {heat}"
+    )
+    gas = heat.gas_passed - (heat.gas - heat.gas_initially)
+    assert abs(gas) <= 1e-12 * heat.gas, f"t = {reactor.time:g} s: gas off by {gas / heat.gas:.2g}"
+
+
+def wall(side: str, **condition: Any) -> dict[str, Any]:
+    """A whole side of a strip with one condition."""
+    return {"name": f"{side}_wall", "side": side, **condition}
+
+
+HEATED: dict[str, Any] = {
+    "energy.initial_temperature": "473 K",
+    "geometry.bed_temperature": "298 K",
+    "geometry.wall": [
+        wall("bottom", temperature="450 K", end="30 mm"),
+        wall("top", temperature="473 K", end="95 mm"),
+    ],
+    "geometry.inlet.tma.temperature": "400 K",
+}
+"""Cold powder in a hot zone, with a warm feed."""
 
 
 def flow_scale(case: Case, strip: Strip, field: FlowField) -> float:

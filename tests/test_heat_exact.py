@@ -3,7 +3,6 @@
 The gas of most cases is so thin (gas.density) that it carries no heat, where the solution is that of solids alone.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,9 @@ import pytest
 from scipy.special import erfc
 
 from mpm.case.case import Case
-from mpm.mesh.grid import Grid
 from mpm.reactor.reactor import Reactor, Result
-from mpm.report.records import HeatTotals
 
-from .cases import MPI, column_case, norm, rate, strip_case
+from .cases import MPI, assert_heat_balances, column_case, heat_of, norm, rate, strip_case, wall
 
 BLOCK = {
     "porosity": 0.4,
@@ -32,36 +29,9 @@ THIN = {"temperature": "300 K", "density": "1e-9 kg/m^3"}
 STILL = {"gamma": 0.0, "bed_velocity": "0 m/s", "start": "0 s"}
 
 
-def heat_of(reactor: Reactor) -> HeatTotals:
-    heat = reactor.totals().heat
-    assert heat is not None
-    return heat
-
-
-def assert_heat_balances(reactor: Reactor) -> None:
-    """Heat closes to 1e-9 of its largest term, the gas to 1e-12; collective, and usable as the callback of a run."""
-    heat = heat_of(reactor)
-    terms = [*heat.inlets, *heat.outlets, *heat.walls, heat.solids, heat.heating, heat.reaction]
-    stored = heat.stored - heat.stored_initially
-    steady = reactor.case.fidelity == "steady"
-    residual = sum(terms) - (0.0 if steady else stored)
-    scale = max(map(abs, [*terms, stored, 1e-6]))
-    assert abs(residual) <= 1e-9 * scale, f"t = {reactor.time:g} s: heat off by {residual / scale:.2g}, {heat}"
-    gas = heat.gas_passed - (0.0 if steady else heat.gas - heat.gas_initially)
-    assert abs(gas) <= 1e-12 * heat.gas, f"t = {reactor.time:g} s: gas off by {gas / heat.gas:.2g}"
-
-
 def run(case: Case) -> tuple[Reactor, Result]:
     reactor = Reactor(case, MPI.COMM_SELF)
     return reactor, reactor.run(callback=assert_heat_balances)
-
-
-def middles(edges: Any) -> Any:
-    return 0.5 * (edges[1:] + edges[:-1])
-
-
-def wall(side: str, **condition: Any) -> dict[str, Any]:
-    return {"name": f"{side}_wall", "side": side, **condition}
 
 
 def test_two_layers_between_walls() -> None:

@@ -24,7 +24,7 @@ from mpm.parallel import on_root, total
 from mpm.reactor import checkpoint
 from mpm.reactor.reactor import Reactor, Result
 
-from .cases import MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, run, zone
+from .cases import HEATED, MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, run, zone
 
 COMM = MPI.COMM_WORLD
 RESOLVED = {"fidelity": "resolved", "time.end": "0.2 s", "output.every": "50 ms", "time.steps_per_cycle": 16}
@@ -36,6 +36,9 @@ MODES = {
     "periodic solids": zone(
         {"time.end": "0.8 s", "output.every": "0.1 s", "geometry.bed_inflow": "periodic"}, TINY
     ),
+    "heated": zone({"time.end": "0.5 s", "output.every": "0.1 s", **HEATED}, TINY),
+    "heated resolved": zone({**RESOLVED, **HEATED, "energy.flow_update": 0.002}, TINY),
+    "heated impulsive": zone({**RESOLVED, **HEATED, "motion.startup": "impulsive"}, TINY),
     "both precursors": cycle(
         {
             "time.end": "4 s",
@@ -60,7 +63,9 @@ def interrupted(case: Case, folder: Path, after: float, comm: MPI.Comm = COMM) -
 
 
 def assert_same_state(one: Result, other: Result, tolerance: float) -> None:
-    """Concentrations (over the largest) and coverages of two results, cell by cell; collective."""
+    """Concentrations (over the largest), coverages and temperatures of two results, cell by cell; collective."""
+    if one.case.energy is not None:
+        np.testing.assert_allclose(one.field("temperature"), other.field("temperature"), rtol=tolerance)
     for name in ("TMA", "CH4", "H2O", "Al(OH)3"):
         a, b = one.field(f"C_{name}"), other.field(f"C_{name}")
         np.testing.assert_allclose(a, b, rtol=0.0, atol=tolerance * max(a.max(), 1e-12))
@@ -86,7 +91,7 @@ def test_resumed_run_equals_the_uninterrupted_one(mode: str, tmp_path: Path) -> 
 
 
 @pytest.mark.parallel(alone=False)
-@pytest.mark.parametrize("mode", ["resolved", "impulsive", "both precursors"])
+@pytest.mark.parametrize("mode", ["resolved", "impulsive", "heated", "heated impulsive", "both precursors"])
 def test_restart_state_is_complete_on_several_ranks(mode: str, tmp_path: Path) -> None:
     """Fails when a run that goes on from a state differs by more than 1e-12 from the run that wrote the state in passing.
 
