@@ -38,13 +38,6 @@ def largest(comm: MPI.Comm, values: ArrayLike) -> Floats:
     return result
 
 
-def within(comm: MPI.Comm, values: ArrayLike) -> tuple[float, float]:
-    """The smallest and the largest of all values of all ranks."""
-    local = np.asarray(values, dtype=float)
-    ends = largest(comm, [-local.min(initial=np.inf), local.max(initial=-np.inf)])
-    return -float(ends[0]), float(ends[1])
-
-
 def any_rank(comm: MPI.Comm, flag: bool) -> bool:
     """True on every rank as soon as it is true on one."""
     return bool(comm.allreduce(bool(flag), op=MPI.LOR))

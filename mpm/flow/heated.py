@@ -17,7 +17,7 @@ from mpm.flow.fields import FlowField
 from mpm.flow.problem import STEADY, FlowProblem
 from mpm.flow.sequence import CyclicFlow, Watch
 from mpm.flow.state import GasState
-from mpm.motion.kinematics import BedMotion
+from mpm.motion.kinematics import BedMotion, StepMotion
 from mpm.motion.schedule import RESTING, Schedule, Step
 
 if TYPE_CHECKING:
@@ -71,23 +71,18 @@ class HeatedCycle:
         self._more, self._fields = None, {}
         return self.cycle
 
-    def find_again(self, exact: bool) -> bool:
-        """Find the flow with the weight that the gas has now; with its viscosity and density, too, where `exact` or these have moved by
-        more than `energy.flow_update`. Returns whether they are those of now. Raises ConvergenceError.
-        """
-        since = moved(self.strip, self.gas.temperature, self.found_in.temperature)
-        if exact or since > self._update:
-            self.find()
-            return True
-        problem = self._solver()
-        problem.weigh_as(self.gas)
-        self.cycle = CyclicFlow.found(problem, self.bed_motion, self.schedule, guess=self.cycle)
-        return False
+    def adopt(self, field: FlowField, motion: StepMotion) -> None:
+        """Take over a `field` under a constant `motion` as the flow in the present state of the gas; collective."""
+        self.cycle = CyclicFlow(None, [field])
+        self._problem, self.found_in = self._new_problem(self.gas), self.gas
+        self._problem.start_from(field, (1.0, motion.frame_velocity_y))
+        self._more, self._fields = None, {}
 
     def _new_problem(self, gas: GasState) -> FlowProblem:
         return FlowProblem(self.case, self.strip, self.schedule.dt, refined=True, gas=gas)
 
-    def _solver(self) -> FlowProblem:
+    @property
+    def problem(self) -> FlowProblem:
         """The problem in the state of the gas in which the flow was found."""
         if self._problem is None:
             self._problem = self._new_problem(self.found_in)
@@ -102,7 +97,7 @@ class HeatedCycle:
             return
         if moved(self.strip, self.gas.temperature, self.found_in.temperature) > self._update:
             self.find(vibrates=step.phase != RESTING)
-        problem = self._solver()
+        problem = self.problem
         driven = problem.driven(density.source if density.changed else None, problem.lighter(self.gas))
         self._more, self._fields = problem.space.velocities(driven), {}
 

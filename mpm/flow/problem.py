@@ -239,9 +239,7 @@ class FlowProblem:
             return 0.0
         self.space.curl.multTranspose(self.unbalanced, self._rhs)
         if exact:
-            share = self.convection_share
-            matrix = assembled_jacobian(self.space, self.viscous, self.convection, self.values, share)
-            solver = DirectSolver(matrix, "flow (Newton)")
+            solver = DirectSolver(self.jacobian(STEADY), "flow (Newton)")
             solver.solve(self._rhs, self._psi)
             solver.destroy()
         else:
@@ -251,6 +249,23 @@ class FlowProblem:
         fastest = max(self.space.fastest(self.values), STILL * driving_speed(self.case))
         change, fastest = largest(self.strip.comm, [change, fastest])
         return float(change / fastest) if fastest > 0.0 else 0.0
+
+    def jacobian(self, time: float) -> PETSc.Mat:
+        """Z^T (A + dN/du + M/time) Z at the state, to be destroyed by who asked for it; collective."""
+        return assembled_jacobian(
+            self.space, self.operator(time), self.convection, self.values, self.convection_share
+        )
+
+    def imbalance(self, motion: StepMotion) -> Floats:
+        """Z^T (A u + N - f) at the state under `motion` (own unknowns,); collective."""
+        self.weigh(motion)
+        self.space.curl.multTranspose(self.unbalanced, self._rhs)
+        return np.array(self._rhs.array)
+
+    def change(self, psi: Floats) -> None:
+        """Add Z psi to the state; collective."""
+        self._psi.array[:] = -psi
+        self._adopt()
 
     def decayed(self, change: Floats, time: float, tolerance: float) -> Floats:
         """What is left of a `change` of the flow (local fluxes,), ports closed, after an implicit step of `time` [s]; collective.

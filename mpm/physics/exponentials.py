@@ -24,6 +24,14 @@ def bernoulli(z: Floats) -> Floats:
     return np.where(small, 1.0 - near / 2.0 + near * near / 12.0, far / np.expm1(far))
 
 
+def bernoulli_slope(z: Floats) -> Floats:
+    """B'(z) = B(z) (1 - B(-z)) / z, between -1 and 0, with its series near 0."""
+    z = np.asarray(z, dtype=float)
+    small = np.abs(z) < 1e-3
+    far = np.where(small, 1.0, np.clip(z, -700.0, 700.0))
+    return np.where(small, -0.5 + z / 6.0, bernoulli(far) * (1.0 - bernoulli(-far)) / far)
+
+
 def phi1(x: Floats) -> Floats:
     """(1 - exp(-x)) / x for x >= 0."""
     return _series(

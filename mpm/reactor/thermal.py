@@ -14,13 +14,14 @@ import numpy as np
 
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
+from mpm.flow.cycle import mean_motion
 from mpm.flow.heated import HeatedCycle
 from mpm.flow.heated_march import HeatedMarch
 from mpm.flow.sequence import Watch
 from mpm.flow.state import GasState, gas_amount
 from mpm.motion.schedule import Schedule, Step
-from mpm.numerics.anderson import Anderson
-from mpm.parallel import within
+from mpm.parallel import largest
+from mpm.reactor.steady.overturning import Overturning
 from mpm.report.records import HeatTotals
 from mpm.transport.heat import Heat, HeatMemento, HeatOperator
 
@@ -32,12 +33,16 @@ if TYPE_CHECKING:
     from mpm.transport.species import Transport
 
 HeatedFlow = HeatedCycle | HeatedMarch
-TURNS = 100  # of flow and temperature, on the way to the steady state
-SETTLED = 1e-3  # K, largest change of a temperature in the last turn
-DEPTH, SHARE = (
-    20,
-    0.5,
-)  # of Anderson's mixture: 30 turns where the gas turns over, 40 with a depth of 10, no end with 6
+STEPS = 100  # Newton's, on the way to the steady flow and temperature
+SETTLED = 1e-3  # K, largest change of a temperature in the last step; the next would be smaller by 10 or more
+FIRST, NEVER = 1.0, 1e12  # s, pseudo-time of the first step, and one that no longer counts
+LITTLE, UNKNOWN = (
+    1.0,
+    50.0,
+)  # K: temperatures that are given and lie closer than the first say nothing of the spread there will be
+# of the spread of temperatures: steps that change more are taken back; below the others pseudo-time lengthens, or is no longer needed
+FAR, STEEP, CLOSE = 2.0, 0.2, 0.02
+LONGER, SHORTER = 4.0, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,23 +95,28 @@ class Thermal:
     # --- the steady state ---
 
     def _settle_flow(self, flow: HeatedCycle) -> None:
-        """Temperature and flow in turn until neither changes, by Anderson's mixture of the last turns.
-
-        Gas that is heated from below turns over as a whole: one after the other, unmixed, they would never meet.
-        """
-        heat, mixed = self.heat, Anderson(self.strip.comm, self.strip.volume[: self.strip.owned], DEPTH)
-        exact = True
-        for _ in range(TURNS):
-            before = heat.excess
-            change = self.settle()
-            if change < SETTLED and exact:
-                return
-            low, high = within(self.strip.comm, [before, heat.excess])
-            heat.excess = np.clip(mixed.next(before, heat.excess, SHARE), low, high)
+        """Newton's steps on temperature and flow until neither changes; those that go too far are taken back and shortened."""
+        heat, newton, change = self.heat, Overturning(self.heat, self.strip), np.inf
+        given = self.case.temperatures[-1] - self.case.temperatures[0]
+        spread = given if given > LITTLE else UNKNOWN
+        motion, bed, time = mean_motion(self.motion), self.case.conveying_velocity, FIRST
+        for _ in range(STEPS):
+            problem, operator = flow.problem, self._steady_operator()
+            supply = heat.steady_supply(operator, bed, self._booked())
+            psi, warmer = newton.step(problem, self.gas, motion, operator, supply, time)
+            change = float(largest(self.strip.comm, [np.abs(warmer).max(initial=0.0)])[0])
+            if not change < FAR * spread:
+                time *= SHORTER
+                continue
+            problem.change(psi)
+            heat.excess = heat.excess + warmer
             flow.density.take(heat.temperature)
-            exact = flow.find_again(exact=change < SETTLED)
+            flow.adopt(problem.field(), motion)
+            if change < SETTLED:
+                return
+            time = NEVER if change < CLOSE * spread else time * (LONGER if change < STEEP * spread else 1.0)
         raise ConvergenceError(
-            f"steady state: temperatures still change by {change:.3g} K after {TURNS} turns of flow and heat; the gas may have no steady "
+            f"steady state: temperatures still change by {change:.3g} K after {STEPS} steps of flow and heat; the gas may have no steady "
             "flow where it is heated from below: try fidelity averaged"
         )
 

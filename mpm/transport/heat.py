@@ -41,11 +41,12 @@ FILL = 1
 @dataclass(frozen=True, eq=False)
 class HeatOperator:
     """Fluxes of heat over rho_ref c_p in one flow: those of gas and conduction, with what goes to walls in the diagonal; `walls` are the
-    conductances [m2/s] of each wall's cells, `conductivity` (local cells,) that of the cells [W/m/K]."""
+    conductances [m2/s] of each wall's cells, `velocity` and `conductance` (faces,) [m/s] what the fluxes inside are made of."""
 
     fluxes: FluxOperator
     walls: list[Floats]
-    conductivity: Floats
+    velocity: Floats
+    conductance: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,7 @@ class Heat:
         fluxes = FluxOperator(
             bare.from_behind, bare.from_ahead, bare.inlets, bare.outlets, outflow, bare.drawn_in
         )
-        return HeatOperator(fluxes, walls, conductivity)
+        return HeatOperator(fluxes, walls, faces.inner, assembler.conductance)
 
     def _stream(self, solids: float) -> Floats:
         """Velocity over the faces inside [m/s] at which gas would carry as much heat as the bed does; none over a seam with fresh
@@ -157,6 +158,19 @@ class Heat:
             np.add.at(
                 supply, wall.cells, conductance * (wall.outside - self.reference) + wall.flow / self.unit
             )
+        return supply
+
+    def steady_supply(
+        self, operator: HeatOperator, solids: float, made: Floats, drawn: dict[str, Floats] | None = None
+    ) -> Floats:
+        """The same with what the bed brings in at `solids` [m/s] and reactions give off, `made` (own,) [W/m]; collective.
+
+        `drawn`: what outlets draw back in, that of the present temperatures unless it is given.
+        """
+        means = self.outlet_means(operator, self.excess) if drawn is None else drawn
+        supply = self.supply(operator, means) + made / self.unit
+        cells, stream = self.leaving(solids, entering=True)
+        supply[cells] += stream * self._columns.fresh[0, 0] if len(cells) else 0.0
         return supply
 
     def outlet_means(self, operator: HeatOperator, excess: Floats) -> dict[str, Floats]:
@@ -215,9 +229,7 @@ class Heat:
         """Take the temperatures of the steady state in the flow of `operator`, the bed passing at `solids` [m/s] and reactions giving off
         `made` (own,) [W/m]; returns the largest change of a temperature [K]. Collective. Raises ConvergenceError.
         """
-        supply = self.supply(operator, {}) + made / self.unit
-        cells, stream = self.leaving(solids, entering=True)
-        supply[cells] += stream * self._columns.fresh[0, 0] if len(cells) else 0.0
+        supply = self.steady_supply(operator, solids, made, {})
         before, self.excess = self.excess, steady_fields(self.strip, [operator.fluxes], supply[None])[0]
         return float(largest(self.strip.comm, [np.abs(self.excess - before).max(initial=0.0)])[0])
 
