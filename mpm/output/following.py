@@ -17,7 +17,7 @@ from mpm.report.quantities import quantity
 from mpm.report.rounding import shown
 from mpm.screen import duration
 
-SHOWN = ("titration.*.exit_mean", "titration.*.box_mean", "cvd.rate_mean")
+SHOWN = ("titration.*.exit_mean", "titration.*.box_mean", "cvd.rate_mean", "temperature.bed_exit")
 """Numbers of the history that one follows a run by."""
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ (.*)")
 

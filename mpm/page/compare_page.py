@@ -17,6 +17,7 @@ from mpm.page.run_page import RunPage, run_page
 from mpm.page.viewer import BUDGET, VALUES, looks, viewer
 from mpm.page.write import render
 from mpm.report.fieldnames import superscript
+from mpm.report.quantities import quantity
 from mpm.report.quantity import Quantity
 from mpm.report.rounding import natural_scale
 from mpm.report.trees import flatten
@@ -124,7 +125,7 @@ def number_table(runs: Sequence[Run]) -> list[Changed]:
 
 def _has(what: Quantity, steady: bool) -> bool:
     """Whether a run of this kind reports the number in this unit: amounts of steady states are per second."""
-    return not what.rate or what.unit.endswith("/s") == steady
+    return what.unit == quantity(what.name, steady).unit
 
 
 def _number_line(what: Quantity, numbers: Sequence[Mapping[str, float]]) -> Changed:

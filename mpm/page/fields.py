@@ -43,7 +43,7 @@ class Look:
     unit: str
     factor: float
     logarithmic: bool
-    colours: str
+    colours: str | tuple[tuple[float, str], ...]
 
 
 @dataclass(frozen=True, eq=False)

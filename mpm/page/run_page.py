@@ -17,6 +17,7 @@ from mpm.page.curves import Chart, curves
 from mpm.page.numbers import Account, Row, accounts, errors, groups
 from mpm.page.strip import Drawing, drawing
 from mpm.page.viewer import BUDGET, viewer
+from mpm.page.warmth import warmth
 from mpm.page.write import render
 from mpm.report.verdict import verdict
 from mpm.screen import HARD_SPACE, Listing, entry
@@ -92,7 +93,7 @@ def run_page(
         groups=groups(run.summary),
         accounts=accounts(run.summary),
         errors=errors(run.summary),
-        charts=curves(run, say),
+        charts=[*curves(run, say), *warmth(run)],
         viewer=viewer(run, budget, say=say) if budget else None,
         reproduce=reproduce(run),
         inputs=inputs(run),
@@ -105,6 +106,7 @@ TITLES = (
     ("Motion", ("motion.",)),
     ("Materials", ("material.",)),
     ("Gas", ("gas.",)),
+    ("Temperature", ("energy.",)),
     ("Chemistry", ("chemistry.",)),
 )
 """Headings of the case's values, and the keys below them."""

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 from mpm.case.case import Case
 from mpm.case.ports import Inlet, Outlet
+from mpm.case.walls import Wall
 from mpm.pictures.outline import MM, OKABE_ITO, spread
 
 WIDTH = 860.0
@@ -51,6 +52,17 @@ class PortMark:
 
 
 @dataclass(frozen=True)
+class WallMark:
+    """A wall that gives or takes heat, from one end to the other; `text` says what it does."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    text: str
+
+
+@dataclass(frozen=True)
 class Drawing:
     """Everything that the template needs; `above`, `below` are the lines of labels outside the strip."""
 
@@ -59,9 +71,11 @@ class Drawing:
     scale: str
     bands: Sequence[Band]
     ports: Sequence[PortMark]
+    walls: Sequence[WallMark]
     zones: Sequence[tuple[str, float, float]]
     direction: int
     speed: str
+    warmth: str
     periodic: bool
     inflow: str
     length: str
@@ -97,9 +111,11 @@ def drawing(case: Case) -> Drawing:
         scale="to scale" if stretch == 1 else f"height stretched {stretch} times",
         bands=_bands(case, per_metre * stretch),
         ports=ports,
+        walls=_walls(case, per_metre, per_metre * stretch),
         zones=[(zone.name, zone.start * per_metre, zone.end * per_metre) for zone in geometry.zones],
         direction=case.direction if speed > 0.0 else 0,
         speed=f"{speed:.3g} cm/s" if speed > 0.0 else "at rest" if moving else "",
+        warmth=_warmth(case),
         periodic=geometry.periodic,
         inflow=geometry.bed_inflow,
         length=f"{geometry.length * MM:g} mm",
@@ -143,6 +159,8 @@ def port_lines(case: Case, port: Inlet | Outlet) -> tuple[str, ...]:
         return (port.name, "to ambient pressure")
     fed = [f"{name} {port.mass_fractions[name]:.3g}" for name in case.fed_by(port)]
     lines = [port.name, f"{port.velocity * 100.0:.3g} cm/s {case.gas.carrier}"]
+    if case.energy is not None:
+        lines[-1] += f" at {case.inlet_temperature(port):.4g} K"
     if fed:
         lines[-1] += f" + {', '.join(fed)} (mass)"
         windows = [
@@ -152,6 +170,51 @@ def port_lines(case: Case, port: Inlet | Outlet) -> tuple[str, ...]:
         if windows != ["from 0 s"]:
             lines.append("doses " + (", ".join(windows) if len(windows) < 3 else f"{len(windows)} times"))
     return tuple(lines)
+
+
+def wall_text(wall: Wall) -> str:
+    """What a wall does, in words."""
+    if wall.temperature is not None:
+        what = f"at {wall.temperature:.4g} K"
+    elif wall.heat_flux is not None:
+        what = f"gives {wall.heat_flux:.4g} W/m\u00b2"
+    else:
+        what = (
+            f"passes {wall.heat_transfer_coefficient:.4g} W/m\u00b2/K to surroundings at {wall.ambient:.4g} K"
+        )
+    return f"wall {wall.name}, {wall.start * MM:g} to {wall.end * MM:g} mm, {what}"
+
+
+def _warmth(case: Case) -> str:
+    """A sentence on the temperatures of a case with `[energy]`."""
+    if case.energy is None:
+        return ""
+    enters = (
+        ""
+        if case.geometry.moving_layer is None
+        else f"; solids that come in have {case.bed_temperature:.4g} K"
+    )
+    walls = (
+        f" Walls in red: {'; '.join(wall_text(wall) for wall in case.geometry.walls)}."
+        if case.geometry.walls
+        else ""
+    )
+    return f"At first all is at {case.energy.initial_temperature:.4g} K{enters}.{walls}"
+
+
+def _walls(case: Case, along: float, up: float) -> list[WallMark]:
+    """Walls at their place; `along`, `up`: pixels per metre."""
+    length, height = case.geometry.length * along, case.geometry.height * up
+    marks = []
+    for wall in case.geometry.walls:
+        if wall.horizontal:
+            y = 0.0 if wall.side == "top" else height
+            ends = (wall.start * along, y, wall.end * along, y)
+        else:
+            x = 0.0 if wall.side == "left" else length
+            ends = (x, height - wall.start * up, x, height - wall.end * up)
+        marks.append(WallMark(*ends, wall_text(wall)))
+    return marks
 
 
 def _ports(case: Case, per_metre: float) -> list[PortMark]:

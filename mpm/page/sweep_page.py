@@ -15,7 +15,7 @@ from mpm.page.numbers import shown
 from mpm.page.run_page import run_html, run_page
 from mpm.page.write import render, write_page
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import FIRST, quantity
+from mpm.report.quantities import FIRST, first, quantity
 from mpm.report.quantity import RATIO, Quantity
 from mpm.report.rounding import without_rounding
 from mpm.sweep.layout import Layout, read_json
@@ -174,8 +174,8 @@ def _is_number(cell: str) -> bool:
 
 
 def _place(column: Column) -> int:
-    section = column.name.partition(".")[0]
-    return FIRST.index(section) if section in FIRST else len(FIRST)
+    place = first(column.name)
+    return len(FIRST) if place is None else place
 
 
 def _points(root: Path, rows: Sequence[dict[str, str]], say: Callable[[str], None]) -> list[Point]:

@@ -28,6 +28,8 @@ from mpm.report.fieldnames import field_name
 
 BUDGET = 5_000_000
 """Bytes of fields that a page carries at most, beside 2 MB of plotly."""
+STOPS = 33
+"""Places of a colour map that plotly does not know; between them it mixes."""
 VALUES = 6_000_000
 """Numbers of each field that are looked at for a page, cells times times."""
 
@@ -37,7 +39,8 @@ def looks(run: Run) -> dict[str, tuple[Look, Maker]]:
     sites = [f"theta_{site}" for site in made_sites(run.case)]
     species = [f"x_{name}" for name in run.case.mechanism.species_names]
     found: dict[str, tuple[Look, Maker]] = {}
-    for name in (*sites, *species, "velocity", "pressure", "cvd_rate"):
+    warmth = () if run.case.energy is None else ("temperature", "density")
+    for name in (*sites, *species, *warmth, "velocity", "pressure", "cvd_rate"):
         what = field_name(name)
         look = Look(
             name=name,
@@ -45,10 +48,24 @@ def looks(run: Run) -> dict[str, tuple[Look, Maker]]:
             unit=what.unit_shown,
             factor=what.factor,
             logarithmic=what.scale == "log",
-            colours=what.colours.capitalize(),
+            colours=plotly_colours(what.colours),
         )
         found[name] = (look, _porous(name) if what.porous else _speed if name == "velocity" else _cells(name))
     return found
+
+
+def plotly_colours(name: str) -> str | tuple[tuple[float, str], ...]:
+    """A colour map of matplotlib for plotly: by its name where plotly has it, else as STOPS places and colours."""
+    if name in ("viridis", "cividis"):
+        return name.capitalize()
+    import matplotlib as mpl
+    from matplotlib.colors import to_hex
+
+    places = np.linspace(0.0, 1.0, STOPS)
+    return tuple(
+        (float(place), to_hex(colour))
+        for place, colour in zip(places, mpl.colormaps[name](places), strict=True)
+    )
 
 
 def _cells(name: str) -> Maker:
@@ -69,12 +86,12 @@ def _speed(run: Run, snapshot: Snapshot) -> Floats:
 
 def stream_maker() -> Maker:
     """The stream function at the corners of the cells; found again only where the flow has changed since the snapshot before."""
-    from mpm.pictures.streamlines import stream_function
+    from mpm.pictures.streamlines import carried, stream_function
 
     before: list[Floats] = []
 
     def make(run: Run, snapshot: Snapshot) -> Floats:
-        velocity = run.field(snapshot, "velocity")
+        velocity = carried(snapshot.cell_data)
         if not before or not np.array_equal(velocity, before[0]):
             before[:] = [velocity, stream_function(run.grid, velocity)]
         return before[1]

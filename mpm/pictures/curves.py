@@ -28,6 +28,8 @@ TITRATION = {
     "exit_min": (":", "where solids leave the zone, worst row", "in the last column of the zone, worst row"),
 }
 """Line and words of the columns of a titration, where a bed is conveyed and where nothing moves."""
+OF_NO_SPECIES = {"sites": "surface sites", "energy": "heat", "gas": "gas"}
+"""Words for what is balanced beside the species."""
 BELOW = 1e-6
 """Part of the largest mole fraction in any outlet below which curves are named and not drawn."""
 
@@ -93,7 +95,7 @@ def titrations(run: Run) -> list[tuple[str, dict[str, Floats]]]:
 def balance_curves(run: Run) -> dict[str, Floats]:
     """Balance errors in the history by what they are of, in words."""
     errors = {key.removeprefix("balance."): v for key, v in run.history.items() if key.startswith("balance.")}
-    return {"surface sites" if name == "sites" else formula(name): v for name, v in errors.items()}
+    return {OF_NO_SPECIES.get(name) or formula(name): v for name, v in errors.items()}
 
 
 def has_history(run: Run) -> bool:

@@ -20,8 +20,18 @@ from mpm.labels import literal
 from mpm.mesh.grid import Grid
 from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
-from mpm.pictures.outline import LINE, MM, WIDTH, draw_layers, draw_ports, draw_zones, formula, way
-from mpm.pictures.streamlines import stream_function, stream_levels
+from mpm.pictures.outline import (
+    LINE,
+    MM,
+    WIDTH,
+    draw_layers,
+    draw_ports,
+    draw_walls,
+    draw_zones,
+    formula,
+    way,
+)
+from mpm.pictures.streamlines import carried, stream_function, stream_levels
 from mpm.report.fieldnames import FieldName, Limits, colour_limits, field_name, field_values
 
 PLAIN = "#d9e3ea"
@@ -149,6 +159,8 @@ def drawn_how(run: Run, stretch: int, streamlines: bool = False) -> str:
     notes = ["to scale" if stretch == 1 else f"height stretched {stretch} times"]
     if any(0.0 < zone.end < run.case.geometry.length for zone in run.case.geometry.zones):
         notes.append("dashed: borders of zones")
+    if run.case.geometry.walls:
+        notes.append("red: walls that give or take heat")
     if streamlines:
         notes.append("lines: streamlines of the gas, the same flow between any two")
     return "; ".join(notes)
@@ -163,6 +175,7 @@ def draw_strip(
     axes.set_aspect(stretch)
     axes.set_facecolor("#f2f2f2")
     draw_layers(axes, run.case, grid, grid.height / grid.length * WIDTH * stretch)
+    draw_walls(axes, run.case)
     draw_ports(axes, run.case)
     axes.set_ylabel("y [mm]")
     return mesh
@@ -224,7 +237,7 @@ def draw_streamlines(
     panels: Sequence[Axes], grid: Grid, snapshot: Snapshot, stretch: float
 ) -> list[ContourSet | Line2D]:
     """Streamlines on every panel; on the first, whose heights are drawn `stretch` times, with the direction of the gas."""
-    psi = stream_function(grid, snapshot.cell_data["velocity"])
+    psi = stream_function(grid, carried(snapshot.cell_data))
     levels = stream_levels(grid, psi)
     if not len(levels):
         return []

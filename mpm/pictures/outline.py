@@ -16,6 +16,8 @@ from mpm.mesh.grid import Grid
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 WIDTH = 9.0
 """Width of a map without its margins [inch]."""
+WARM = "#B2182B"
+"""Colour of walls that give or take heat."""
 LINE = 8.5
 """Height of a line of small text [points]."""
 MM = 1e3
@@ -63,6 +65,21 @@ def spread(positions: Sequence[float], distance: float) -> list[float]:
     for i in range(len(down) - 2, -1, -1):
         down[i] = min(down[i], down[i + 1] - distance)
     return [0.5 * (a + b) for a, b in zip(up, down, strict=True)]
+
+
+def draw_walls(axes: Axes, case: Case) -> None:
+    """Walls that give or take heat as red lines on their side."""
+    for wall in case.geometry.walls:
+        ends = [wall.start, wall.end]
+        at = float(wall.side in ("top", "right"))
+        if wall.horizontal:
+            places = ([x * MM for x in ends], [at, at])
+        else:
+            places = ([at, at], [y / case.geometry.height for y in ends])
+        axes.plot(
+            *places, color=WARM, linewidth=3, solid_capstyle="butt", clip_on=False, gid="wall", zorder=4,
+            transform=axes.get_xaxis_transform() if wall.horizontal else axes.transAxes,
+        )  # fmt: skip
 
 
 def draw_ports(axes: Axes, case: Case) -> None:

@@ -34,7 +34,9 @@ CROWDED = 2.5
 MOST = 6.5
 """Steps between the ends of a linear bar, at most."""
 NUMBERED = ("zone", "layer")
-PRESETS = {"viridis": "Viridis (matplotlib)", "cividis": "Cividis", "PuOr_r": "PuOr"}
+PRESETS = {
+    "viridis": "Viridis (matplotlib)", "cividis": "Cividis", "PuOr_r": "PuOr", "inferno": "Inferno (matplotlib)",
+}  # fmt: skip
 """ParaView's names of matplotlib's colour maps."""
 
 
@@ -64,6 +66,7 @@ def write_scripts(directory: str | Path, say: Callable[[str], None]) -> list[Scr
     run = load_run(directory, say)
     sites, species, files = made_sites(run.case)[:1], run.case.fed_species[:1], run.directory
     panels = [f"theta_{name}" for name in sites] + [f"x_{name}" for name in species]
+    panels += ["temperature"] if run.case.energy is not None else []
     written = [_write(run, files.fields, VIEW, panels or ["velocity"], say)]
     if files.phases.steps:
         written.append(_write(run, files.phases, VIBRATION, ["velocity_lab", "velocity"], say))

@@ -7,12 +7,14 @@
 | `map_cvd.png` | rate of the parasitic gas-phase reaction, where there is one |
 | `speed.png` | speed of the gas with its streamlines |
 | `pressure.png` | pressure of the gas |
+| `temperature.png` | temperature of gas and solids, in runs with `[energy]` |
+| `heating.png` | temperature of each layer along the strip, and over time |
 | `history.png` | titration of each dosing inlet, balances on a logarithmic axis |
 | `outlets.png` | mole fractions in each outlet |
 | `exit_profile.png` | coverage over the height of the bed where it leaves each dosing zone |
 
-Any other field, time or range: `draw_field`. The colours are those of Okabe and Ito (2008) and matplotlib's cividis and viridis: all
-stay apart for colour-blind readers.
+Any other field, time or range: `draw_field`. The colours are those of Okabe and Ito (2008) and matplotlib's cividis, viridis and inferno:
+all stay apart for colour-blind readers.
 """
 
 from __future__ import annotations
@@ -43,6 +45,7 @@ from mpm.pictures.curves import (
 )
 from mpm.pictures.maps import ends_of, map_figure, when
 from mpm.pictures.outline import OKABE_ITO
+from mpm.pictures.warmth import warmth_figure
 from mpm.report.dosing import made_sites
 from mpm.report.fieldnames import Limits, field_name
 
@@ -158,6 +161,9 @@ def pictures(
         profiles = list(fields.at(profile_steps(run)))
         words = "coverage over the height of the bed where it leaves each zone"
         yield Picture("exit_profile", words, partial(exit_profile_figure, run, profiles))
+    if run.case.energy is not None and (snapshot is not None or len(run.history.get("time", ())) > 1):
+        words = "temperature of each layer along the strip, and over time"
+        yield Picture("heating", words, partial(warmth_figure, run, snapshot))
     if len(run.history.get("time", ())) > 1:
         if has_history(run):
             yield Picture(
@@ -184,7 +190,7 @@ def maps(run: Run, snapshot: Snapshot, suffix: str) -> Iterator[Picture]:
         wanted["cvd_rate"] = "map_cvd"
     wanted |= {
         name: stem
-        for name, stem in (("velocity", "speed"), ("pressure", "pressure"))
+        for name, stem in (("velocity", "speed"), ("pressure", "pressure"), ("temperature", "temperature"))
         if name in snapshot.cell_data
     }
     for name, stem in wanted.items():

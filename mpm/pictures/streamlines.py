@@ -2,16 +2,29 @@
 
 The discrete flow has no divergence: the fluxes through the faces of every cell add up to nothing. It therefore has a stream function
 whose values at the corners of the cells give those fluxes as differences, and its contour lines are the streamlines, with no path to
-integrate and none that ends inside the strip. Between two neighbouring lines passes the same flow of gas.
+integrate and none that ends inside the strip. Between two neighbouring lines passes the same flow of gas. Where the density follows the
+temperature it is the flux of mass that has no divergence, but for what gas gives off that warms just then.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mpm.arrays import Floats
 from mpm.mesh.grid import Grid
+
+
+def carried(cell_data: Mapping[str, NDArray[np.generic]]) -> Floats:
+    """Superficial velocity of the gas (cells, 2 or 3) [m/s], where the file has a density the flux of mass over the mean density."""
+    velocity = np.asarray(cell_data["velocity"], dtype=float)
+    density = cell_data.get("density")
+    if density is None:
+        return velocity
+    rho = np.asarray(density, dtype=float)
+    return velocity * (rho / rho.mean())[:, None]
 
 
 def stream_function(grid: Grid, velocity: NDArray[np.generic]) -> Floats:

@@ -75,6 +75,8 @@ FIELDS = (
     FieldName("velocity_x", "gas velocity along x (superficial)", "m/s", "cm/s", colours="PuOr_r", signed=True),
     FieldName("velocity_y", "gas velocity upwards (superficial)", "m/s", "cm/s", colours="PuOr_r", signed=True),
     FieldName("pressure", "pressure of the gas above the outlets", "Pa"),
+    FieldName("temperature", "temperature of gas and solids", "K", colours="inferno"),
+    FieldName("density", "density of the gas", "kg/m^3"),
     FieldName("zone", "number of the zone (0: none)", ""),
     FieldName("layer", "number of the layer from the bottom", ""),
 )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.markup import paragraph, table
 from mpm.report.fieldnames import superscript
-from mpm.report.quantities import FIRST, quantity, worst_balance_error
+from mpm.report.quantities import FIRST, first, quantity, worst_balance_error
 from mpm.report.rounding import shown
 from mpm.report.trees import flatten
 from mpm.report.verdict import verdict
@@ -27,7 +27,7 @@ def result_html(case: Case, summary: Mapping[str, Any], where: str) -> str:
 def result_rows(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Labels and values; of profiles nothing."""
     steady, numbers = summary.get("fidelity") == "steady", flatten(summary)
-    chosen = [name for section in FIRST for name in numbers if name.split(".")[0] == section]
+    chosen = [name for place in range(len(FIRST)) for name in numbers if first(name) == place]
     rows = [
         (quantity(name, steady).label, superscript(shown(name, numbers, steady)))
         for name in chosen

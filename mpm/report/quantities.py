@@ -32,8 +32,8 @@ HEADINGS = (
     "What leaves coated", _DOSED, _ASTRAY, "Film", "Temperature", "Heat", "Gas flow", "Gas in the outlets", "Fronts", COST
 )  # fmt: skip
 """Of the sections, in the order in which people ask."""
-FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film")
-"""Sections that are offered before all others, or alone, where there is little room."""
+FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film", "temperature.bed_exit", "heating")
+"""Sections, or single numbers, that are offered before all others, or alone, where there is little room."""
 
 SECTIONS = (
     Section("", "", lambda r: {"time": r.time}, (
@@ -178,6 +178,11 @@ SECTIONS = (
 )  # fmt: skip
 """In the order of the files."""
 QUANTITIES = tuple(number for section in SECTIONS for number in section.numbers)
+
+
+def first(name: str) -> int | None:
+    """The place of a dotted name in `FIRST`; None for what is not among them."""
+    return next((i for i, begin in enumerate(FIRST) if f"{name}.".startswith(f"{begin}.")), None)
 
 
 def headed(names: Iterable[str]) -> list[tuple[str, list[str]]]:

@@ -1,4 +1,4 @@
-"""The result of a run in a sentence or two: what leaves coated, its worst row, how much of the precursor was used, and parasitic growth."""
+"""The result of a run in a sentence or two: what leaves coated, its worst row, use of the precursor, parasitic growth, temperature."""
 
 from __future__ import annotations
 
@@ -40,7 +40,11 @@ def percents(shares: Sequence[float]) -> str:
 def verdict(case: Case, summary: Mapping[str, Any]) -> str:
     """What a run says about its case, in words; for a run that is not done, how it ended first."""
     steady = summary.get("fidelity") == "steady"
-    parts = [*(_coating(case, summary) or [_no_coating(case)]), *_growth(case, summary)]
+    parts = [
+        *(_coating(case, summary) or [_no_coating(case)]),
+        *_growth(case, summary),
+        *_warmth(case, summary),
+    ]
     when = "In the steady state" if steady else f"After {summary.get('simulated_seconds', 0.0):.4g} s"
     return f"{_ended(summary)}{when}, {'; '.join(parts)}."
 
@@ -120,3 +124,14 @@ def _growth(case: Case, summary: Mapping[str, Any]) -> list[str]:
         if share < NOTHING
         else f"parasitic growth in the gas took {percent(share)} of a precursor"
     ]
+
+
+def _warmth(case: Case, summary: Mapping[str, Any]) -> list[str]:
+    """With what temperature powder enters and leaves."""
+    leaves = summary.get("temperature", {}).get("bed_exit")
+    if leaves is None:
+        return []
+    enters = "" if case.geometry.bed_inflow == "periodic" else f" that enters at {case.bed_temperature:.0f} K"
+    way = summary.get("heating", {}).get("length")
+    after = "" if way is None else f", most of the way made after {way * 1e3:.0f} mm"
+    return [f"powder{enters} leaves at {leaves:.0f} K{after}"]

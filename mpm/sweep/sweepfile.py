@@ -45,9 +45,12 @@ AXIS_KEYS = ("key", "linspace", "logspace", "name", "values")
 RANGE_KEYS = ("num", "start", "stop")
 DEFAULT_COLUMNS = (
     *("excess_number.*", "dose_ratio.*", "titration.*", "utilisation.*", "outlets.*", "cvd.*"),
-    *("species.*.balance_error", "simulated_seconds"),
+    *("temperature.*", "heating.*", "energy.*", "species.*.balance_error", "simulated_seconds"),
 )
-DEFAULT_PICTURES = ("titration.*.exit_mean", "utilisation.*", "cvd.rate_mean")
+DEFAULT_PICTURES = (
+    *("titration.*.exit_mean", "utilisation.*", "cvd.rate_mean"),
+    *("temperature.bed_exit", "heating.length"),
+)
 
 
 @dataclass(frozen=True)
