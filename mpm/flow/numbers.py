@@ -70,8 +70,9 @@ def pressure_drops(case: Case, strip: Strip, field: FlowField) -> dict[str, floa
         rows = grid.layer_rows(layer.name)
         first, last = rows.start, rows.stop - 1
         to_faces = 0.5 * (grid.dy[first] * below[first] + grid.dy[last] * above[last])
+        permeability = layer.material.slip_permeability(case.gas.mean_free_path)[1]
         drops[layer.name] = float(
-            pressure[first] - pressure[last] + case.gas.viscosity / layer.material.permeability[1] * to_faces
+            pressure[first] - pressure[last] + case.gas.viscosity / permeability * to_faces
         )
     return drops
 

@@ -53,15 +53,17 @@ class Medium:
         grid, row = strip.grid, strip.row
         mu = case.gas.viscosity if gas is None else gas.viscosity
         porosity = grid.per_row(lambda solid: solid.porosity, gas=1.0)
-        along = grid.per_row(lambda solid: solid.permeability[0], gas=np.inf)
-        through = grid.per_row(lambda solid: solid.permeability[1], gas=np.inf)
+        free_path = case.gas.mean_free_path
+        along = grid.per_row(lambda solid: solid.slip_permeability(free_path)[0], gas=np.inf)
+        through = grid.per_row(lambda solid: solid.slip_permeability(free_path)[1], gas=np.inf)
+        brinkman = grid.per_row(lambda solid: brinkman_length(solid, free_path), gas=np.inf)
         cells = {
             "porosity": porosity[row],
             "viscosity": mu * grid.per_row(lambda solid: solid.viscosity_ratio, gas=1.0)[row],
             "resistance_x": mu / along[row],
             "resistance_y": mu / through[row],
             "moving_solid": np.where(grid.moving, 1.0 - porosity, 0.0)[row],
-            "half_height": shear_distance(grid.dy, grid.per_row(brinkman_length, gas=np.inf))[row],
+            "half_height": shear_distance(grid.dy, brinkman)[row],
         }
         functions = {name: strip.cell_values(values, name) for name, values in cells.items()}
         if gas is None:
@@ -71,9 +73,9 @@ class Medium:
         return cls(density=density, buoyant=buoyant, width=grid.dx, **functions)
 
 
-def brinkman_length(solid: Material) -> float:
-    """l = sqrt(K_x mu_e/mu) [m]: how far into a solid the shear of the gas beside it reaches."""
-    return math.sqrt(solid.permeability[0] * solid.viscosity_ratio)
+def brinkman_length(solid: Material, free_path: float = 0.0) -> float:
+    """l = sqrt(K_x mu_e/mu) [m]: how far into a solid the shear of the gas beside it reaches; `free_path` [m] of its molecules."""
+    return math.sqrt(solid.slip_permeability(free_path)[0] * solid.viscosity_ratio)
 
 
 def shear_distance(heights: Floats, brinkman: Floats) -> Floats:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from mpm.arrays import Floats
 from mpm.physics.elements import parse_formula
 from mpm.physics.gases import CARRIERS
 from mpm.physics.mechanism import Species
@@ -68,7 +69,9 @@ def carrier_ratio(species: Species, carrier: str, molar_mass: float) -> float | 
     )
 
 
-def thermal_diffusion(molar_mass: float, carrier_molar_mass: float, temperature: float) -> float:
+def thermal_diffusion[Value: (float, Floats)](
+    molar_mass: float, carrier_molar_mass: float, temperature: Value
+) -> Value:
     """S [mol/m/s] of a dilute species: its molar flux is -x_i S grad ln T (Soret), above 0 for what is heavier than the carrier.
 
     S = D_T,i/(M_i x_i) with D_T,i = -2.59e-7 T^0.659 [a_i X_i/sum a X - Y_i] [sum a X/sum b X] kg/m/s, a = M^0.511, b = M^0.489 with M in
@@ -77,7 +80,8 @@ def thermal_diffusion(molar_mass: float, carrier_molar_mass: float, temperature:
     """
     ratio = molar_mass / carrier_molar_mass
     bracket = (math.pow(ratio, 0.511) - ratio) * math.pow(1e3 * carrier_molar_mass, 0.022)
-    return -2.59e-7 * math.pow(temperature, 0.659) * bracket / molar_mass
+    warmth: Value = temperature**0.659
+    return -2.59e-7 * warmth * bracket / molar_mass
 
 
 def scaled_diffusivity(

@@ -58,7 +58,7 @@ class SurfaceKinetics:
         self._molar_mass = {s.name: s.molar_mass for s in mechanism.species}
         self.heat_to(temperature)
         self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
-            -1, len(names)
+            len(self.reactions), len(names)
         )
 
     def heat_to(self, temperature: ArrayLike) -> None:

@@ -45,11 +45,14 @@ def slip_factor(free_path: float, pore_diameter: float) -> float:
     return 1.0 + 8.0 * free_path / pore_diameter
 
 
-def knudsen_diffusivity(pore_diameter: float, molar_mass: float, temperature: float) -> float:
+def knudsen_diffusivity[Value: (float, NDArray[np.float64])](
+    pore_diameter: Value, molar_mass: float, temperature: Value
+) -> Value:
     """D_K = (d/3) sqrt(8 R T/(pi M)) [m2/s] of free molecules in a pore of diameter d [m]: Knudsen 1909."""
-    return pore_diameter / 3.0 * math.sqrt(8.0 * GAS_CONSTANT * temperature / (math.pi * molar_mass))
+    speed: Value = (8.0 * GAS_CONSTANT * temperature / (math.pi * molar_mass)) ** 0.5
+    return pore_diameter / 3.0 * speed
 
 
-def bosanquet(diffusivity: float, knudsen: float) -> float:
+def bosanquet[Value: (float, NDArray[np.float64])](diffusivity: Value, knudsen: Value) -> Value:
     """1/D = 1/D_m + 1/D_K [m2/s]: collisions with molecules and with walls (Bosanquet; Pollard and Present 1948)."""
     return diffusivity * knudsen / (diffusivity + knudsen)

@@ -89,7 +89,9 @@ def conditions(case: Case, schedule: Schedule) -> dict[str, Any]:
         "mesh": (geometry.length, geometry.columns, geometry.periodic),
         "layer": [(layer.height, layer.cells, layer.grading, layer.moving) for layer in geometry.layers],
         "material": [
-            (solid.porosity, solid.permeability, solid.viscosity_ratio) if (solid := layer.material) else None
+            (solid.porosity, solid.slip_permeability(case.gas.mean_free_path), solid.viscosity_ratio)
+            if (solid := layer.material)
+            else None
             for layer in geometry.layers
         ],
         "inlet": [(port.side, port.x0, port.x1, port.velocity) for port in geometry.inlets],

@@ -17,6 +17,7 @@ STREAMS = 4  # pieces of a rank that a triangular solve goes through at once
 # averaged); iterations were not timed on more, and would take half of that on four
 FEW = 4
 FALL = 1e-13  # of a residual, where it is not below what a step may leave before
+FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
 
 
 class FacePattern:
@@ -107,13 +108,13 @@ class StepMatrix:
     `residual` [mol/m/s].
     """
 
-    def __init__(self, strip: Strip, name: str, residual: float, fill: int = 0):
+    def __init__(self, strip: Strip, name: str, residual: float, fill: int = 0, fall: float = FALL):
         self.strip, self.name = strip, name
         self.cells = CellMatrix(strip, 1)
         self._holds: tuple[int, float] | None = None
         self._krylov = KrylovSolver(self.cells.matrix, name, 0.0, fill=fill)
         least = residual / np.sqrt(max(self.cells.matrix.size[0], 1))
-        self._krylov.ksp.setTolerances(rtol=FALL, atol=least)
+        self._krylov.ksp.setTolerances(rtol=fall, atol=least)
         self._serving: ServingSolver | None = None  # once the matrix recurs
         self._x, self._y = self.cells.matrix.createVecs()
 

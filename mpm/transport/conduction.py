@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import Strip
-from mpm.physics.thermal import effective_conductivity
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -19,18 +18,12 @@ if TYPE_CHECKING:
 
 def cell_conductivity(case: Case, strip: Strip, temperature: Floats) -> Floats:
     """k_eff of every local cell [W/m/K] at the `temperature` (local cells,) [K]: of the gas, or of solids and the gas in their pores."""
-    gas = np.asarray(case.gas.conductivity_at(temperature), dtype=float)
-    model = "parallel" if case.energy is None else case.energy.conductivity_model
-    result = gas.copy()
+    result = np.array(case.gas.conductivity_at(temperature), dtype=float)
     layer = strip.grid.row_layer[strip.row]
     for number, solid in enumerate(strip.grid.materials):
-        inside = layer == number
-        if solid is None:
-            continue
-        if solid.effective_conductivity is not None:
-            result[inside] = solid.effective_conductivity
-        elif solid.conductivity is not None:
-            result[inside] = effective_conductivity(model, solid.porosity, gas[inside], solid.conductivity)
+        if solid is not None and case.energy is not None:
+            inside = layer == number
+            result[inside] = case.energy.conductivity_of(solid, result[inside])
     return result
 
 

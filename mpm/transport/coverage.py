@@ -120,7 +120,7 @@ class Coverage:
             capacity = (self._row_surface * self._row_sites * grid.dy[self.rows] * grid.dx)[self.moving_rows]
             self.passed = self.passed + exchanged @ capacity
             whole[:, self.moving_rows] = moving
-            self._theta = self.scatter.to_local(whole.reshape(len(whole), -1))
+            self._theta = self.scatter.to_local(whole.reshape(len(whole), len(self.rows) * self.columns))
         self.shifted = target
         return count
 

@@ -28,7 +28,7 @@ from mpm.flow.fields import FaceFlow, inlet_share
 from mpm.mesh.strip import Strip
 from mpm.parallel import any_rank
 from mpm.physics.exponentials import bernoulli
-from mpm.physics.porous import effective_diffusivity
+from mpm.physics.porous import bosanquet, effective_diffusivity, knudsen_diffusivity
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -49,11 +49,24 @@ def exponential_flux(velocity: Floats, conductance: Floats) -> tuple[Floats, Flo
     return np.maximum(b + velocity, 0.0), b
 
 
-def cell_diffusivity(strip: Strip, diffusivity: float) -> Floats:
-    """D_eff along x and y in every local cell, (2, cells) [m2/s], of a gas with this `diffusivity` [m2/s]."""
+def cell_diffusivity(
+    strip: Strip, diffusivity: float | Floats, molar_mass: float = 0.0, temperature: float | Floats = 0.0
+) -> Floats:
+    """D_eff along x and y in every local cell, (2, cells) [m2/s], of a gas with this `diffusivity` [m2/s], one value or one per cell.
+
+    Where a solid has a pore_diameter, a gas of this `molar_mass` [kg/mol] meets its walls, too (Bosanquet), at the `temperature` [K].
+    """
     grid = strip.grid
     along_x = grid.per_row(lambda solid: solid.tortuosity_factor[0], gas=1.0)[strip.row]
     along_y = grid.per_row(lambda solid: solid.tortuosity_factor[1], gas=1.0)[strip.row]
+    if any(solid is not None and solid.pore_diameter for solid in grid.materials):
+        width = grid.per_row(lambda solid: solid.pore_diameter or 0.0, gas=0.0)[strip.row]
+        free = np.broadcast_to(np.asarray(diffusivity, dtype=float), width.shape)
+        hot = np.broadcast_to(np.asarray(temperature, dtype=float), width.shape)
+        diffusivity = free.copy()
+        narrow = (width > 0.0) & (free > 0.0)
+        walls = knudsen_diffusivity(width[narrow], molar_mass, hot[narrow])
+        diffusivity[narrow] = bosanquet(free[narrow], walls)
     return np.stack(
         [effective_diffusivity(diffusivity, strip.porosity, factor) for factor in (along_x, along_y)]
     )
@@ -114,16 +127,25 @@ class FluxOperator:
 class FluxAssembler:
     """Builds the flux operators of what diffuses with D_eff `diffusivity` (2, local cells) [m2/s] in many velocity fields.
 
-    `relative` (local cells,) is nu, None where that is 1 everywhere; `diffusivity` is then nu D_eff.
+    `relative` (local cells,) is nu, None where that is 1 everywhere; `diffusivity` is then nu D_eff. `drift` (faces,) [m/s] carries beside
+    the gas.
     """
 
-    def __init__(self, case: Case, strip: Strip, diffusivity: Floats, relative: Floats | None = None):
+    def __init__(
+        self,
+        case: Case,
+        strip: Strip,
+        diffusivity: Floats,
+        relative: Floats | None = None,
+        drift: Floats | None = None,
+    ):
         self.case, self.strip, self.diffusivity, self.relative = case, strip, diffusivity, relative
-        self.conductance = face_conductance(strip, diffusivity)
+        self.conductance, self.drift = face_conductance(strip, diffusivity), drift
 
     def operator(self, flow: FaceFlow) -> FluxOperator:
         """The operator of one velocity field; collective."""
-        from_behind, from_ahead = exponential_flux(flow.inner, self.conductance)
+        inner = flow.inner if self.drift is None else flow.inner + self.drift
+        from_behind, from_ahead = exponential_flux(inner, self.conductance)
         if self.relative is not None:
             from_behind /= self.relative[self.strip.faces.behind]
             from_ahead /= self.relative[self.strip.faces.ahead]

@@ -23,9 +23,10 @@ from mpm.mesh.strip import Strip
 from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.parallel import Scatter, largest, total
 from mpm.physics.roles import Roles
-from mpm.transport.cell_matrix import StepMatrix
+from mpm.transport.cell_matrix import FALL, FALL_HEATED, StepMatrix
 from mpm.transport.coverage import Coverage
-from mpm.transport.fluxes import FluxAssembler, FluxOperator, cell_diffusivity
+from mpm.transport.diffusant import Diffusant
+from mpm.transport.fluxes import FluxAssembler, FluxOperator
 from mpm.transport.foresight import REMEMBERED, Past, possible
 from mpm.transport.ledger import Entries, Ledger
 from mpm.transport.newton import RESIDUAL, NewtonSystem, forcing
@@ -74,16 +75,17 @@ class Transport:
         self.ledger = Ledger(self.ports, self.reactions)
         self.concentration = np.zeros((len(self.names), strip.owned))
         self.past = Past(REMEMBERED[case.fidelity])
-        diffusivities = [case.gas.diffusivity[name] for name in self.names]
-        self.diffusivities = sorted(set(diffusivities))
-        self._group = [self.diffusivities.index(d) for d in diffusivities]
+        diffusants = [Diffusant.of(case, name) for name in self.names]
+        self._diffusants = sorted(set(diffusants))
+        self.diffusivities = [one.diffusivity for one in self._diffusants]
+        self._group = [self._diffusants.index(one) for one in diffusants]
         self._dispersion: Floats | None = None
         self._gas: GasState | None = None
         self._assemble()
         fill, product_fill = FILL[case.fidelity]
-        residual = self.ports.feed_rate * RESIDUAL
+        residual, fall = self.ports.feed_rate * RESIDUAL, FALL if case.energy is None else FALL_HEATED
         self._linear = [
-            StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill)
+            StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill, fall)
             for d in self.diffusivities
         ]
         self._newton = NewtonSystem(strip, self.coupled, fill) if self.coupled else None
@@ -96,18 +98,10 @@ class Transport:
 
     def _assemblers(self, dispersion: Floats) -> list[FluxAssembler]:
         """Those of the diffusivities in the pores, each with its `dispersion` added."""
-        case, strip, gas = self.case, self.strip, self._gas
-        found = []
-        for molecular, added in zip(self.diffusivities, dispersion, strict=True):
-            effective = cell_diffusivity(strip, molecular)
-            if gas is None:
-                found.append(FluxAssembler(case, strip, effective + added))
-            else:
-                hotter = case.gas.diffusivity_factor(gas.temperature)
-                found.append(
-                    FluxAssembler(case, strip, gas.relative * (hotter * effective + added), gas.relative)
-                )
-        return found
+        return [
+            one.assembler(self.case, self.strip, self._gas, added)
+            for one, added in zip(self._diffusants, dispersion, strict=True)
+        ]
 
     def disperse(self, dispersion: Floats) -> None:
         """Add `dispersion` (diffusivities, 2, local cells) [m2/s] to diffusion while the reactor vibrates, where the mean of the flow

@@ -1,0 +1,56 @@
+"""How a species spreads: diffusion in free gas and between the walls of pores, and along gradients of temperature (Soret).
+
+J_i = -n D_i^eff grad x_i - S_i^eff x_i grad ln T
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mpm.arrays import Floats
+from mpm.flow.state import GasState
+from mpm.mesh.strip import Strip
+from mpm.physics.diffusion import thermal_diffusion
+from mpm.transport.fluxes import FluxAssembler, cell_diffusivity, face_conductance
+
+if TYPE_CHECKING:
+    from mpm.case.case import Case
+
+
+@dataclass(frozen=True, order=True)
+class Diffusant:
+    """All that decides it: the diffusivity in the gas of the case [m2/s] and, where pores are narrow or Soret counts, the molar mass
+    [kg/mol], which is else 0: species that spread alike share their matrices."""
+
+    diffusivity: float
+    molar_mass: float
+
+    @classmethod
+    def of(cls, case: Case, species: str) -> Diffusant:
+        """That of a species of the case."""
+        narrow = any(layer.material and layer.material.pore_diameter for layer in case.geometry.layers)
+        heavy = narrow or (case.energy is not None and case.energy.soret)
+        return cls(case.gas.diffusivity[species], case.mechanism.get(species).molar_mass if heavy else 0.0)
+
+    def assembler(
+        self, case: Case, strip: Strip, gas: GasState | None, dispersion: Floats | float
+    ) -> FluxAssembler:
+        """What builds its flux operators in the state `gas`, or at that of the case; `dispersion` (2, local cells) is added to
+        diffusion."""
+        if gas is None:
+            effective = cell_diffusivity(strip, self.diffusivity, self.molar_mass, case.gas.temperature)
+            return FluxAssembler(case, strip, effective + dispersion)
+        free = self.diffusivity * case.gas.diffusivity_factor(gas.temperature)
+        effective = cell_diffusivity(strip, free, self.molar_mass, gas.temperature)
+        drift = self._drift(case, strip, gas) if case.energy is not None and case.energy.soret else None
+        return FluxAssembler(case, strip, gas.relative * (effective + dispersion), gas.relative, drift)
+
+    def _drift(self, case: Case, strip: Strip, gas: GasState) -> Floats:
+        """-S^eff grad ln T over the molar density of the case, through the faces inside (faces,) [m/s]: heavy species drift to the cold."""
+        free = thermal_diffusion(self.molar_mass, case.gas.molar_mass, gas.temperature)
+        through = face_conductance(strip, cell_diffusivity(strip, free / case.gas.molar_density))
+        warmth = np.log(gas.temperature)
+        return np.asarray(-through * (warmth[strip.faces.ahead] - warmth[strip.faces.behind]))
