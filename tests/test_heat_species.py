@@ -130,7 +130,7 @@ def test_thermal_diffusion_separates_a_strip_at_rest() -> None:
         },
         gas={"temperature": "300 K", "diffusivity": "2e-5 m^2/s"},
         chemistry=TRACER,
-        energy={"soret": True},
+        energy={"soret": True, "buoyancy": False},
         motion=STILL,
         time={"end": "60 s", "step": "0.5 s"},
         output={"every": "20 s"},
