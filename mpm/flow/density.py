@@ -77,7 +77,10 @@ class Density:
 def restored_state(case: Case, values: Floats) -> GasState:
     """The state with these temperatures and relative densities (2, local cells)."""
     temperature, relative = values
-    return GasState(temperature, relative, case.gas.viscosity_at(temperature), case.gas.density)
+    pressure = 1.0
+    if not case.geometry.outlets and len(temperature):
+        pressure = float(relative[0] * temperature[0] / case.gas.temperature)
+    return GasState(temperature, relative, case.gas.viscosity_at(temperature), case.gas.density, pressure)
 
 
 def moved(strip: Strip, temperature: Floats, since: Floats) -> float:

@@ -8,8 +8,7 @@ nobody needs a state: density and viscosity are those of the case.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from itertools import count
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mpm.arrays import Floats
@@ -24,15 +23,14 @@ if TYPE_CHECKING:
 class GasState:
     """Temperature [K], density over that of the case's `[gas]`, and viscosity [Pa s] in every local cell.
 
-    Without a mixture the amount of gas per volume is in the same ratio as its density. `reference` [kg/m3] is the density of the case. No
-    two states of a process have the same `version`.
+    `reference` [kg/m3] is the density of the case, `pressure` p0 over that of the case: 1 but in a closed strip, where heating raises it.
     """
 
     temperature: Floats
     relative: Floats
     viscosity: Floats
     reference: float
-    version: int = field(default_factory=count(1).__next__)
+    pressure: float = 1.0
 
     @property
     def buoyant(self) -> Floats:
@@ -46,10 +44,12 @@ class GasState:
         Without outlets p0 is what keeps the `amount` of gas, the volume integral of the relative density [m2].
         """
         everywhere = strip.scatter.to_all(temperature)[strip.cell]
-        relative = case.gas.temperature / everywhere
+        relative, pressure = case.gas.temperature / everywhere, 1.0
         if amount is not None and not case.geometry.outlets:
-            relative = relative * (amount / gas_amount(strip, relative))
-        return cls(everywhere, relative, case.gas.viscosity_at(everywhere), case.gas.density)
+            pressure = amount / gas_amount(strip, relative)
+        return cls(
+            everywhere, relative * pressure, case.gas.viscosity_at(everywhere), case.gas.density, pressure
+        )
 
 
 def gas_amount(strip: Strip, relative: Floats) -> float:

@@ -43,7 +43,7 @@ class Diffusant:
         if gas is None:
             effective = cell_diffusivity(strip, self.diffusivity, self.molar_mass, case.gas.temperature)
             return FluxAssembler(case, strip, effective + dispersion)
-        free = self.diffusivity * case.gas.diffusivity_factor(gas.temperature)
+        free = self.diffusivity * case.gas.diffusivity_factor(gas.temperature) / gas.pressure
         effective = cell_diffusivity(strip, free, self.molar_mass, gas.temperature)
         drift = self._drift(case, strip, gas) if case.energy is not None and case.energy.soret else None
         return FluxAssembler(case, strip, gas.relative * (effective + dispersion), gas.relative, drift)
@@ -51,6 +51,7 @@ class Diffusant:
     def _drift(self, case: Case, strip: Strip, gas: GasState) -> Floats:
         """-S^eff grad ln T over the molar density of the case, through the faces inside (faces,) [m/s]: heavy species drift to the cold."""
         free = thermal_diffusion(self.molar_mass, case.gas.molar_mass, gas.temperature)
-        through = face_conductance(strip, cell_diffusivity(strip, free / case.gas.molar_density))
+        towards_cold = 1.0 if self.molar_mass > case.gas.molar_mass else -1.0
+        through = face_conductance(strip, cell_diffusivity(strip, np.abs(free) / case.gas.molar_density))
         warmth = np.log(gas.temperature)
-        return np.asarray(-through * (warmth[strip.faces.ahead] - warmth[strip.faces.behind]))
+        return np.asarray(-towards_cold * through * (warmth[strip.faces.ahead] - warmth[strip.faces.behind]))
