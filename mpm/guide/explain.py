@@ -205,6 +205,7 @@ def _reported(numbers: list[Quantity]) -> Iterator[Line]:
         yield 2, f"{label}: {quantity(reported.name).meaning}", 0
         unit = {"1": "a ratio", "": "a count"}.get(reported.unit, reported.unit)
         shown = f", shown in {reported.unit_shown}" if reported.shown else ""
-        steady = " (per second in a steady run)" if reported.rate else ""
+        per_second = quantity(reported.name, steady=True).unit
+        steady = f" ({per_second} in a steady run)" if reported.rate else ""
         yield 2, f"unit        {unit}{shown}{steady}", _LABEL
     yield 2, f"found in    {_OUTPUT}", _LABEL
