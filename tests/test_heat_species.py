@@ -272,3 +272,26 @@ def test_fidelities_agree() -> None:
         assert np.abs(leaving).max() < 1.0, f"{fidelity}: {leaving}"
         for layer in grid.layer_names:
             assert abs(warmer[grid.layer_rows(layer)].mean()) < 1.0, f"{fidelity}, {layer}"
+
+
+def test_pressure_drop_of_a_cold_bed_is_that_of_its_own_gas() -> None:
+    """Fails when viscosity or velocity of another temperature enter: mu(T) u h/K with u = m/rho(T) of a column that is cold all through."""
+    block = {
+        "porosity": 0.4,
+        "permeability": "1 um^2",
+        "surface_to_volume": "0 1/m",
+        "tortuosity_factor": 2.0,
+        "density": "2000 kg/m^3",
+        "heat_capacity": "800 J/kg/K",
+        "conductivity": "1 W/m/K",
+    }
+    case = column_case(
+        *(5e-3, 2, 0.02, block),
+        inlet={"temperature": "300 K"},
+        gas={"temperature": "500 K"},
+        energy={"initial_temperature": "300 K", "buoyancy": False},
+        motion=STILL,
+        time={"end": "20 ms", "step": "10 ms"},
+    )
+    drop = Reactor(case, MPI.COMM_SELF).run().summary["flow"]["pressure_drop"]["packing"]
+    assert drop == pytest.approx(case.gas.viscosity_at(300.0) * 0.02 * 5e-3 / 1e-12, rel=1e-9)

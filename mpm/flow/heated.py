@@ -1,7 +1,8 @@
 """The flow of gas whose temperature changes slowly against a cycle: a mean or a cycle that follows it.
 
 It belongs to the temperatures at which it was found, and is found anew when these have moved by more than `energy.flow_update`; until then
-what heating drives out of the cells (`mpm.flow.density`) and what buoyancy gains are added as creeping flow, one back-substitution a step.
+what heating drives out of the cells (`mpm.flow.density`) and what buoyancy gains are added as creeping flow. Mass is kept to rounding in
+every step; which way that gas takes is found anew when it has changed by WAY, or after AGE steps.
 """
 
 from __future__ import annotations
@@ -14,15 +15,20 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.flow.density import Density, moved, restored_state
 from mpm.flow.fields import FlowField
+from mpm.flow.given import spreading
 from mpm.flow.problem import STEADY, FlowProblem
 from mpm.flow.sequence import CyclicFlow, Watch
 from mpm.flow.state import GasState
 from mpm.motion.kinematics import BedMotion, StepMotion
 from mpm.motion.schedule import RESTING, Schedule, Step
+from mpm.parallel import total
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.mesh.strip import Strip
+
+WAY = 0.1  # change of what is driven out, over that and what inlets blow, after which its way is found anew
+AGE = 10  # steps after which it is in any case, and with it what buoyancy gains
 
 
 class HeatedCycle:
@@ -46,7 +52,15 @@ class HeatedCycle:
         self.cycle: CyclicFlow | None = None
         self._more: Floats | None = None  # velocities (4, local cells) beside those of the cycle
         self._driven = False  # gas is being given off
+        self._way = np.zeros(
+            (4, strip.local)
+        )  # of what is added, beside the straight way of what is driven out
+        self._source, self._age = (
+            np.zeros(strip.owned),
+            AGE,
+        )  # for which that was found, and so many steps ago
         self._fields: dict[FlowField, FlowField] = {}
+        self._blown = sum(inlet.velocity * inlet.width for inlet in case.geometry.inlets)
 
     @property
     def gas(self) -> GasState:
@@ -68,7 +82,7 @@ class HeatedCycle:
         self.cycle = CyclicFlow.found(problem, self.bed_motion, self.schedule, watch, guess)
         problem.release(kept=STEADY)
         self._problem, self.found_in = problem, self.gas
-        self._more, self._fields = None, {}
+        self._more, self._fields, self._age = None, {}, AGE
         return self.cycle
 
     def adopt(self, field: FlowField, motion: StepMotion) -> None:
@@ -97,9 +111,19 @@ class HeatedCycle:
             return
         if moved(self.strip, self.gas.temperature, self.found_in.temperature) > self._update:
             self.find(vibrates=step.phase != RESTING)
+        self._drive(density.source)
+
+    def _drive(self, source: Floats) -> None:
+        """Let the cells give off `source` (own,) [m2/s] beside the flow that was found; collective."""
         problem = self.problem
-        driven = problem.driven(density.source if density.changed else None, problem.lighter(self.gas))
-        self._more, self._fields = problem.space.velocities(driven), {}
+        straight = problem.space.velocities(spreading(problem.space, source))
+        off, whole = total(self.strip.comm, [np.abs(source - self._source).sum(), np.abs(source).sum()])
+        self._age += 1
+        if self._age >= AGE or off > WAY * (whole + self._blown):
+            driven = problem.driven(source, problem.lighter(self.gas))
+            self._way = problem.space.velocities(driven) - straight
+            self._source, self._age = source, 0
+        self._more, self._fields = straight + self._way, {}
 
     def at(self, step: Step) -> FlowField:
         """The field of the step's phase, and what is added to it."""
@@ -136,6 +160,8 @@ class HeatedCycle:
             "found_in": scatter.to_root(np.stack([then.temperature, then.relative])[:, :own]),
             "more": scatter.to_root(more),
             "driven": self._driven,
+            "way": scatter.to_root(np.vstack([self._way[:, :own], self._source])),
+            "age": self._age,
         }
 
     def restore(self, stored: dict[str, Any], steps: int) -> None:
@@ -145,5 +171,7 @@ class HeatedCycle:
         self.found_in = restored_state(self.case, stored["found_in"][:, self.strip.cell])
         more = np.ascontiguousarray(stored["more"][:, self.strip.cell])
         self._more = more if stored["more"].any() else None
-        self._driven = bool(stored["driven"])
+        self._driven, self._age = bool(stored["driven"]), int(stored["age"])
+        way = np.ascontiguousarray(stored["way"][:, self.strip.cell])
+        self._way, self._source = way[:4], way[4, : self.strip.owned]
         self._problem, self._fields = None, {}

@@ -16,10 +16,11 @@ from mpm.parallel import total
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
+    from mpm.flow.state import GasState
 
 
-def flow_numbers(case: Case, strip: Strip, mean: FlowField) -> dict[str, Any]:
-    """The table `flow` of summary.json.
+def flow_numbers(case: Case, strip: Strip, mean: FlowField, gas: GasState | None = None) -> dict[str, Any]:
+    """The table `flow` of summary.json; of gas in another state than that of the case, `gas`, volumes are those in the state of the case.
 
     `inflow`, `outflow` through all inlets and outlets and `outlets.<name>` through each [m2/s, m3/s per metre of depth; net of what it
     draws back in], `mass_error` their mismatch over the inflow, `bed_superficial_velocity` of the gas in the moving layer [m/s],
@@ -35,7 +36,7 @@ def flow_numbers(case: Case, strip: Strip, mean: FlowField) -> dict[str, Any]:
     moving = case.geometry.moving_layer
     if moving is not None:
         numbers["bed_superficial_velocity"] = layer_velocity(strip, mean, moving.name)
-    drops = pressure_drops(case, strip, mean)
+    drops = pressure_drops(case, strip, mean, gas)
     for layer in case.geometry.layers:
         if layer.name in drops:
             name = "bed_pressure_drop" if layer.moving else "frit_pressure_drop"
@@ -53,7 +54,9 @@ def layer_velocity(strip: Strip, field: FlowField, layer: str) -> list[float]:
     return [float(along / volume), float(up / volume)]
 
 
-def pressure_drops(case: Case, strip: Strip, field: FlowField) -> dict[str, float]:
+def pressure_drops(
+    case: Case, strip: Strip, field: FlowField, gas: GasState | None = None
+) -> dict[str, float]:
     """Pressure below each porous layer less that above it, at its faces, mean along x [Pa], by name.
 
     From the layer's own cells: between the centres of its first and last row their difference, from there to the faces Darcy's law,
@@ -61,7 +64,10 @@ def pressure_drops(case: Case, strip: Strip, field: FlowField) -> dict[str, floa
     """
     own, grid = strip.owned, strip.grid
     row, columns = strip.row[:own], grid.columns
-    per_row = [field.pressure[:own], field.velocities[BOTTOM, :own], field.velocities[TOP, :own]]
+    # viscosity times velocity, of which the fields hold mass fluxes over the density of the case
+    viscous = case.gas.viscosity if gas is None else (gas.viscosity / gas.relative)[:own]
+    shear = viscous * field.velocities[:, :own]
+    per_row = [field.pressure[:own], shear[BOTTOM], shear[TOP]]
     pressure, below, above = total(strip.comm, [np.bincount(row, v, grid.rows) for v in per_row]) / columns
     drops = {}
     for layer in case.geometry.layers:
@@ -71,9 +77,7 @@ def pressure_drops(case: Case, strip: Strip, field: FlowField) -> dict[str, floa
         first, last = rows.start, rows.stop - 1
         to_faces = 0.5 * (grid.dy[first] * below[first] + grid.dy[last] * above[last])
         permeability = layer.material.slip_permeability(case.gas.mean_free_path)[1]
-        drops[layer.name] = float(
-            pressure[first] - pressure[last] + case.gas.viscosity / permeability * to_faces
-        )
+        drops[layer.name] = float(pressure[first] - pressure[last] + to_faces / permeability)
     return drops
 
 

@@ -160,12 +160,11 @@ class FlowProblem:
         self.weigh(motion, convective)
         self._balance(STEADY, passes=2 + self.refined)
 
-    def driven(self, source: Floats | None, weight: PETSc.Vec | None) -> Floats:
+    def driven(self, source: Floats, weight: PETSc.Vec | None) -> Floats:
         """The creeping flow, ports closed, of what heating drives out of own cells, `source` (own,) [m2/s], and of a `weight` (own
         fluxes,); (local fluxes,), collective. The state is not changed."""
         state, unbalanced = self.values.copy(), self.unbalanced.array.copy()
-        given = 0.0 * self.values if source is None else spreading(self.space, source)
-        found = self._creeping(given, weight, passes=1)
+        found = self._creeping(spreading(self.space, source), weight, passes=1)
         self.values[:], self.unbalanced.array[:] = state, unbalanced
         return found
 

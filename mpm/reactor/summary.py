@@ -28,7 +28,7 @@ def summarise(course: Course, status: str) -> dict[str, Any]:
         wall=course.clock.wall,
         program=on_root(course.comm, revision),
         versions=versions(),
-        flow={} if mean is None else flow_numbers(course.case, system.strip, mean),
+        flow={} if mean is None else flow_numbers(course.case, system.strip, mean, system.gas),
         latest=course.numbers,
     )
     return summary_of(records)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.flow.sequence import CyclicFlow, MarchedFlow, Watch, begins_at_rest
+from mpm.flow.state import GasState
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
@@ -48,6 +49,11 @@ class System:
         self._flow: Flow | None = None
         self._operators: dict[FlowField, Operators] = {}
         self.count_from_here()
+
+    @property
+    def gas(self) -> GasState | None:
+        """The state of the gas; None where that of the case is everywhere the same."""
+        return None if self.thermal is None else self.thermal.gas
 
     def count_from_here(self) -> None:
         """Let balances count from the present contents."""
@@ -134,7 +140,7 @@ class System:
             recurs = self.schedule.recurs(step) and self.recurring
             self.transport.advance(operators, step.t0, step.dt, recurs)
             if warm is not None:
-                warm.finish(velocity, step.dt)
+                warm.finish(velocity, step.dt, recurs)
         except ConvergenceError as error:
             self._recall(before)
             raise ConvergenceError(f"step {step.index + 1}: {error}") from error

@@ -154,11 +154,15 @@ class Thermal:
         self._events = ledger.surface, ledger.gas
         return self.flow.at(step)
 
-    def finish(self, field: FlowField, dt: float) -> None:
-        """Heat over `dt` [s] in the flow of the step, with what the reactions of the step have given off. Raises ConvergenceError."""
+    def finish(self, field: FlowField, dt: float, recurs: bool) -> None:
+        """Heat over `dt` [s] in the flow of the step, with what its reactions have given off; `recurs` as for species.
+
+        Raises ConvergenceError.
+        """
         if field not in self._operators:
             self._operators[field] = self.heat.operator(field, self.gas)
-        self.heat.advance(self._operators[field], self._before, self.gas, dt, self._given_off())
+        made = self._given_off()
+        self.heat.advance(self._operators[field], self._before, self.gas, dt, made, recurs)
 
     def _given_off(self) -> Floats:
         """Heat of the reactions since `begin` in own cells [J/m]."""

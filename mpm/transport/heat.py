@@ -210,11 +210,17 @@ class Heat:
         return np.asarray(per_volume * grid.dy * grid.dx)
 
     def advance(
-        self, operator: HeatOperator, before: GasState, after: GasState, dt: float, made: Floats
+        self,
+        operator: HeatOperator,
+        before: GasState,
+        after: GasState,
+        dt: float,
+        made: Floats,
+        recurs: bool = False,
     ) -> None:
         """One step of `dt` [s] in which the density goes from `before` to `after` and reactions give off `made` (own,) [J/m]; collective.
 
-        Raises ConvergenceError, the temperatures kept.
+        Steps that `recur` are many with the same operator, density and `dt`. Raises ConvergenceError, the temperatures kept.
         """
         own = slice(0, self.strip.owned)
         drawn = self.outlet_means(operator, self.excess)
@@ -222,7 +228,7 @@ class Heat:
         self._matrix.update(operator.fluxes, dt, held)
         lost = (after.relative - before.relative)[own] * self.strip.gas_volume[own]
         rhs = (held - lost) * self.excess / dt + self.supply(operator, drawn) + made / self.unit / dt
-        self.excess = self._matrix.solve(rhs, self.excess)
+        self.excess = self._matrix.solve(rhs, self.excess, recurs)
         self.book(operator, drawn, dt, total_of(self.strip.comm, made))
 
     def settle(self, operator: HeatOperator, solids: float, made: Floats) -> float:
