@@ -9,6 +9,7 @@ from mpm.mesh.strip import Strip
 from mpm.physics.diffusion import thermal_diffusion
 from mpm.reactor.reactor import Reactor
 from mpm.transport.diffusant import Diffusant
+from mpm.transport.heat_flux import Diffusing
 
 from .cases import (
     HEATED,
@@ -295,3 +296,44 @@ def test_pressure_drop_of_a_cold_bed_is_that_of_its_own_gas() -> None:
     )
     drop = Reactor(case, MPI.COMM_SELF).run().summary["flow"]["pressure_drop"]["packing"]
     assert drop == pytest.approx(case.gas.viscosity_at(300.0) * 0.02 * 5e-3 / 1e-12, rel=1e-9)
+
+
+def test_species_that_diffuse_take_heat_along() -> None:
+    """Fails when sum_i (c_i - c) div(J_i h) is off: by hand of one face, and nothing of it is made or lost in the strip."""
+    case = zone({**HEATED, "geometry.inlet.tma.mass_fractions": {"TMA": 1e-3}}, TINY)
+    system = Reactor(case, MPI.COMM_SELF).system
+    transport, strip = system.transport, system.strip
+    thermal = system.thermal
+    assert thermal is not None
+    random = np.random.default_rng(7)
+    transport.concentration = random.uniform(0.0, 1.0, transport.concentration.shape)
+    excess = random.uniform(-100.0, 100.0, strip.owned)
+    flux = transport.diffusion("TMA")
+    gained = thermal.heat.fluxes.diffusing([Diffusing(50.0, flux)], excess)
+    assert abs(gained.sum()) < 1e-12 * np.abs(gained).sum()
+    face = int(np.argmax(np.abs(flux)))
+    behind, ahead = strip.faces.behind[face], strip.faces.ahead[face]
+    alone = np.where(np.arange(len(flux)) == face, flux, 0.0)
+    carried = 50.0 * flux[face] * 0.5 * (excess[behind] + excess[ahead])
+    one = thermal.heat.fluxes.diffusing([Diffusing(50.0, alone)], excess)
+    assert one[ahead] == pytest.approx(carried) and one[behind] == pytest.approx(-carried)
+    x = transport.concentration[transport.names.index("TMA")] / thermal.gas.relative[: strip.owned]
+    assert np.sign(flux[face]) == np.sign(x[behind] - x[ahead])
+
+
+def test_heat_balances_where_species_bring_their_own() -> None:
+    """Fails when what species bring along does not enter runs, or enters the balance: it moves heat, and is none."""
+    fields = []
+    for capacity in ("29.1 J/mol/K", "3000 J/mol/K"):
+        case = zone(
+            {
+                **HEATED,
+                "geometry.inlet.tma.mass_fractions": {"TMA": 0.01},
+                "chemistry.species.TMA.heat_capacity": capacity,
+                "time.end": "1 s",
+                "output.every": "0.5 s",
+            },
+            TINY,
+        )
+        fields.append(run(case)[1].field("temperature"))
+    assert np.abs(fields[1] - fields[0]).max() > 0.1

@@ -35,15 +35,33 @@ class FlowForms:
         self.weight: PETSc.Vec | None = None
         if gas is not None and case.energy is not None and case.energy.buoyancy:
             self._weight = dolfinx.fem.form(weight(v, m.buoyant))
-            self.weight = self.weight_of(gas)
+            self.weight, self._other_weight = (self.viscous.createVecLeft() for _ in range(2))
+            self.weigh_as(gas)
+
+    def weigh_as(self, gas: GasState) -> None:
+        """Let `weight` be that of gas in another state; collective."""
+        if self.weight is not None:
+            self._weigh(gas, self.weight)
 
     def weight_of(self, gas: GasState) -> PETSc.Vec:
-        """That of gas in another state."""
+        """That of gas in another state, the same vector at every call; collective."""
+        self._weigh(gas, self._other_weight)
+        return self._other_weight
+
+    def _weigh(self, gas: GasState, result: PETSc.Vec) -> None:
         buoyant = self._medium.buoyant
         if buoyant is None:
             raise ValueError("gas of one density has no weight that counts")
         buoyant.x.array[buoyant.function_space.dofmap.list[:, 0]] = gas.buoyant
-        return _assembled(self._weight)
+        force = _assembled(self._weight)
+        result.array[:] = force.array[: self.space.own]
+        force.destroy()
+
+    def destroy(self) -> None:
+        """Free the matrices and vectors; collective."""
+        held = [self.viscous, self.entrainment, self.acceleration, *([self.weight] if self.weight else [])]
+        for one in [*held, *([self.mass] if "mass" in vars(self) else [])]:
+            one.destroy()
 
     @cached_property
     def mass(self) -> PETSc.Mat:

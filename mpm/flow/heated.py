@@ -14,9 +14,10 @@ import numpy as np
 
 from mpm.arrays import Floats
 from mpm.flow.density import Density, moved, restored_state
+from mpm.flow.factors import STEADY
 from mpm.flow.fields import FlowField
 from mpm.flow.given import spreading
-from mpm.flow.problem import STEADY, FlowProblem
+from mpm.flow.problem import FlowProblem
 from mpm.flow.sequence import CyclicFlow, Watch
 from mpm.flow.state import GasState
 from mpm.motion.kinematics import BedMotion, StepMotion
@@ -81,16 +82,23 @@ class HeatedCycle:
             guess = CyclicFlow(None, guess.phases)
         self.cycle = CyclicFlow.found(problem, self.bed_motion, self.schedule, watch, guess)
         problem.release(kept=STEADY)
-        self._problem, self.found_in = problem, self.gas
+        self._take(problem)
         self._more, self._fields, self._age = None, {}, AGE
         return self.cycle
 
     def adopt(self, field: FlowField, motion: StepMotion) -> None:
         """Take over a `field` under a constant `motion` as the flow in the present state of the gas; collective."""
         self.cycle = CyclicFlow(None, [field])
-        self._problem, self.found_in = self._new_problem(self.gas), self.gas
-        self._problem.start_from(field, (1.0, motion.frame_velocity_y))
+        problem = self._new_problem(self.gas)
+        problem.start_from(field, (1.0, motion.frame_velocity_y))
+        self._take(problem)
         self._more, self._fields = None, {}
+
+    def _take(self, problem: FlowProblem) -> None:
+        """Let `problem` be that of the present state of the gas, in place of the one before."""
+        if self._problem is not None:
+            self._problem.destroy()
+        self._problem, self.found_in = problem, self.gas
 
     def _new_problem(self, gas: GasState) -> FlowProblem:
         return FlowProblem(self.case, self.strip, self.schedule.dt, refined=True, gas=gas)

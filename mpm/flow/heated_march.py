@@ -54,6 +54,8 @@ class HeatedMarch:
         """Let the density follow the `temperature` of own cells [K] during `step`; collective."""
         self.density.follow(temperature, step.dt)
         if moved(self.strip, self.gas.temperature, self.found_in.temperature) > self._update:
+            for problem in self._problems.values():
+                problem.destroy()
             self.found_in, self._problems = self.gas, {}
 
     def at(self, step: Step) -> FlowField:

@@ -34,6 +34,7 @@ from mpm.arrays import Floats
 from mpm.constants import GRAVITY
 from mpm.flow.convection import Convection
 from mpm.flow.courant import driving_speed
+from mpm.flow.factors import STEADY, Factors
 from mpm.flow.fields import FlowField
 from mpm.flow.forms import FlowForms
 from mpm.flow.given import port_fields, spreading
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.flow.state import GasState
 
-STEADY = float("inf")  # s, the time step without inertia
 STILL = 1e-10  # of the speed that ports, motion and buoyancy could give: gas that moves no faster is at rest, but for rounding
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
 PortState = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
@@ -71,10 +71,8 @@ class FlowProblem:
         self.space = FlowSpace(case, strip, gas)
         self.state = self.space.function()
         self.convection_share = 1.0  # below 1 on the way to a fast flow
-        self._matrices: dict[float, PETSc.Mat] = {}  # A + M/dt and the factors of its curls, by dt
-        self._solvers: dict[float, DirectSolver] = {}
         self._forms = forms = FlowForms(case, strip, self.space, gas)
-        self.viscous = self._matrices[STEADY] = forms.viscous
+        self.viscous, self._factors = forms.viscous, Factors(forms, self.space)
         self.convection = Convection(self.space, case.gas.density)
         self.unbalanced, self._work = (self.viscous.createVecLeft() for _ in range(2))
         self._psi, self._rhs = (self.space.curl.createVecRight() for _ in range(2))
@@ -92,25 +90,13 @@ class FlowProblem:
 
     def release(self, kept: float | None = None) -> None:
         """Give the memory of all factors back but for one that is `kept`; they are made anew when needed again. Collective."""
-        for dt in [dt for dt in self._matrices if dt != STEADY]:
-            self._matrices.pop(dt).destroy()
-        for dt in [dt for dt in self._solvers if dt != kept]:
-            self._solvers.pop(dt).destroy()
+        self._factors.release(kept)
 
-    def operator(self, dt: float) -> PETSc.Mat:
-        """A + M/dt."""
-        if dt not in self._matrices:
-            matrix = self._matrices[dt] = self.viscous.copy()
-            matrix.axpy(1.0 / dt, self.mass)
-        return self._matrices[dt]
-
-    def _solver(self, dt: float) -> DirectSolver:
-        """The factor of Z^T (A + M/dt) Z."""
-        if dt not in self._solvers:
-            reduced = self.operator(dt).ptap(self.space.curl)
-            definite = self.space.density is None
-            self._solvers[dt] = DirectSolver(reduced, f"flow (step of {dt:.3g} s)", definite)
-        return self._solvers[dt]
+    def destroy(self) -> None:
+        """Free all that is held outside of Python, once another problem takes its place; collective."""
+        self._factors.release()
+        self._forms.destroy()
+        give_back(self.strip.comm)
 
     def lighter(self, gas: GasState) -> PETSc.Vec | None:
         """Weight of `gas` less that of this problem's (own fluxes,), None where weight does not count; collective."""
@@ -123,8 +109,7 @@ class FlowProblem:
 
     def weigh_as(self, gas: GasState) -> None:
         """Let the weight be that of `gas` from now on; collective."""
-        if self._forms.weight is not None:
-            self._forms.weight = self._forms.weight_of(gas)
+        self._forms.weigh_as(gas)
 
     # --- solving ---
 
@@ -210,9 +195,9 @@ class FlowProblem:
             return  # walls all around a cell
         for _ in range(passes):
             self.space.curl.multTranspose(self.unbalanced, self._rhs)
-            self._solver(dt).solve(self._rhs, self._psi)
+            self._factors.solver(dt).solve(self._rhs, self._psi)
             self._adopt()
-            self.operator(dt).multAdd(self._work, self.unbalanced, self.unbalanced)
+            self._factors.operator(dt).multAdd(self._work, self.unbalanced, self.unbalanced)
 
     def _adopt(self) -> None:
         """Subtract the curl of `_psi` from the state; leaves the change in `_work`."""
@@ -252,7 +237,7 @@ class FlowProblem:
     def jacobian(self, time: float) -> PETSc.Mat:
         """Z^T (A + dN/du + M/time) Z at the state, to be destroyed by who asked for it; collective."""
         return assembled_jacobian(
-            self.space, self.operator(time), self.convection, self.values, self.convection_share
+            self.space, self._factors.operator(time), self.convection, self.values, self.convection_share
         )
 
     def imbalance(self, motion: StepMotion) -> Floats:
@@ -284,9 +269,9 @@ class FlowProblem:
     def _iterate(self, dt: float, tolerance: float) -> None:
         """Solve Z^T (A + dN/du + M/dt) Z psi = rhs to the `tolerance`, with the factor of Z^T (A + M/dt) Z as preconditioner."""
         jacobian = Jacobian(
-            self.space, self.operator(dt), self.convection, self.values, self.convection_share
+            self.space, self._factors.operator(dt), self.convection, self.values, self.convection_share
         )
-        jacobian.solve(self._solver(dt), self._rhs, self._psi, tolerance)
+        jacobian.solve(self._factors.solver(dt), self._rhs, self._psi, tolerance)
 
     # --- looking at the state ---
 

@@ -11,8 +11,9 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
 from mpm.flow.cycle import mean_motion, periodic_flow
+from mpm.flow.factors import STEADY
 from mpm.flow.fields import FlowField, mean_field
-from mpm.flow.problem import CLOSED_PORTS, STEADY, FlowProblem, PortState
+from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
 from mpm.flow.steady import steady_flow
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion

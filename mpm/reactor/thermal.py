@@ -23,7 +23,8 @@ from mpm.motion.schedule import Schedule, Step
 from mpm.parallel import largest
 from mpm.reactor.steady.overturning import Overturning
 from mpm.report.records import HeatTotals
-from mpm.transport.heat import Heat, HeatMemento, HeatOperator
+from mpm.transport.heat import Heat, HeatMemento
+from mpm.transport.heat_flux import Diffusing, HeatOperator
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -102,7 +103,8 @@ class Thermal:
         motion, bed, time = mean_motion(self.motion), self.case.conveying_velocity, FIRST
         for _ in range(STEPS):
             problem, operator = flow.problem, self._steady_operator()
-            supply = heat.steady_supply(operator, bed, self._booked())
+            drawn = heat.fluxes.outlet_means(operator, heat.excess)
+            supply = heat.fluxes.steady_supply(operator, bed, self._booked(), drawn)
             psi, warmer = newton.step(problem, self.gas, motion, operator, supply, time)
             change = float(largest(self.strip.comm, [np.abs(warmer).max(initial=0.0)])[0])
             if not change < FAR * spread:
@@ -125,19 +127,23 @@ class Thermal:
 
         Returns the largest change [K]; collective. Raises ConvergenceError.
         """
-        return self.heat.settle(self._steady_operator(), self.case.conveying_velocity, self._booked())
+        return self.heat.settle(self._steady_operator(), self.case.conveying_velocity, self._given())
 
     def book_second(self) -> None:
         """Enter one second of the steady state; collective."""
         self.heat.book_second(self._steady_operator(), self.case.conveying_velocity, self._booked())
 
     def _steady_operator(self) -> HeatOperator:
-        return self.heat.operator(self.flow.mean(), self.gas, self.case.conveying_velocity)
+        return self.heat.fluxes.operator(self.flow.mean(), self.gas, self.case.conveying_velocity)
 
     def _booked(self) -> Floats:
         """Heat of all reactions that are booked, in own cells [J/m]."""
         ledger = self.transport.ledger
         return self._heat_of(ledger.surface, ledger.gas)
+
+    def _given(self) -> Floats:
+        """That and what diffusing species bring along, in own cells [W/m]; collective."""
+        return self._booked() + self.heat.fluxes.diffusing(self._carried(), self.heat.excess)
 
     # --- one step ---
 
@@ -160,9 +166,19 @@ class Thermal:
         Raises ConvergenceError.
         """
         if field not in self._operators:
-            self._operators[field] = self.heat.operator(field, self.gas)
-        made = self._given_off()
-        self.heat.advance(self._operators[field], self._before, self.gas, dt, made, recurs)
+            self._operators[field] = self.heat.fluxes.operator(field, self.gas)
+        made, carried = self._given_off(), self._carried()
+        self.heat.advance(self._operators[field], self._before, self.gas, dt, made, recurs, carried)
+
+    def _carried(self) -> list[Diffusing]:
+        """The species whose heat capacity is known, as they diffuse now; collective."""
+        gas, transport = self.case.gas, self.transport
+        found = []
+        for name in transport.names:
+            own = self.case.mechanism.get(name).heat_capacity
+            if own is not None:
+                found.append(Diffusing(own - gas.heat_capacity * gas.molar_mass, transport.diffusion(name)))
+        return found
 
     def _given_off(self) -> Floats:
         """Heat of the reactions since `begin` in own cells [J/m]."""

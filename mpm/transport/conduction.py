@@ -14,6 +14,7 @@ from mpm.mesh.strip import Strip
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.walls import Wall
+    from mpm.mesh.grid import Grid
 
 
 def cell_conductivity(case: Case, strip: Strip, temperature: Floats) -> Floats:
@@ -27,12 +28,11 @@ def cell_conductivity(case: Case, strip: Strip, temperature: Floats) -> Floats:
     return result
 
 
-def solid_capacity(strip: Strip) -> Floats:
-    """Heat capacity of the solids per total volume, (1 - eps) rho_s c_s, of every local cell [J/m3/K]."""
-    per_row = strip.grid.per_row(
+def solid_capacity(grid: Grid) -> Floats:
+    """Heat capacity of the solids per total volume, (1 - eps) rho_s c_s, of every row [J/m3/K]."""
+    return grid.per_row(
         lambda solid: (1.0 - solid.porosity) * (solid.density or 0.0) * (solid.heat_capacity or 0.0), gas=0.0
     )
-    return per_row[strip.row]
 
 
 @dataclass(frozen=True, eq=False)

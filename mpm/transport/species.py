@@ -143,6 +143,13 @@ class Transport:
             result[i] = matrix.multiply(c)
         return result
 
+    def diffusion(self, name: str, at_rest: bool = False) -> Floats:
+        """Flux of a species through the faces inside by diffusion alone (faces,) [mol/s per metre of depth], -n D_eff grad x;
+        collective."""
+        i = self.names.index(name)
+        assembler = (self._at_rest if at_rest else self._in_motion)[self._group[i]]
+        return assembler.diffusion(self.strip.scatter.to_all(self.concentration[i])[self.strip.cell])
+
     # --- restart ---
 
     def stored(self, scatter: Scatter) -> dict[str, Any]:

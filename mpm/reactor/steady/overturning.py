@@ -23,7 +23,8 @@ from mpm.numerics.linear import DirectSolver
 from mpm.numerics.sparse import sparse_matrix
 from mpm.physics.exponentials import bernoulli_slope
 from mpm.transport.cell_matrix import CellMatrix
-from mpm.transport.heat import Heat, HeatOperator
+from mpm.transport.heat import Heat
+from mpm.transport.heat_flux import HeatOperator
 
 if TYPE_CHECKING:
     from mpm.flow.problem import FlowProblem
@@ -107,9 +108,9 @@ class Overturning:
         rows = [strip.global_cell[faces.behind[behind]], strip.global_cell[faces.ahead[ahead]]]
         columns = [_numbers(space, dofs[behind]), _numbers(space, dofs[ahead])]
         values = [per_flux[behind], -per_flux[ahead]]
-        means = self.heat.outlet_means(operator, self.heat.excess)
+        means = self.heat.fluxes.outlet_means(operator, self.heat.excess)
         for name, port in operator.fluxes.outlets.items():
-            outlet = next(o for o in self.heat.case.geometry.outlets if o.name == name)
+            outlet = next(o for o in self.heat.fluxes.case.geometry.outlets if o.name == name)
             facet, sign = (TOP, 1.0) if outlet.side == "top" else (BOTTOM, -1.0)
             dofs = space.dofs[port.cells, facet]
             coming = means[name][0] if name in means else 0.0
