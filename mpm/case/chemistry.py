@@ -26,6 +26,7 @@ from mpm.units import (
     Number,
     Sticking,
     Temperature,
+    Viscosity,
     is_counted,
     reject,
     worked_out,
@@ -77,6 +78,8 @@ class SpeciesTable(_Table):
     """enthalpy of formation at 298.15 K, for the heat of reactions; of sites only differences count, from any zero"""
     heat_capacity: MolarHeatCapacity | None = None
     """molar heat capacity: a reaction with those of all its parts has a heat that follows temperature"""
+    viscosity: Viscosity | None = None
+    """viscosity of the species alone at gas.temperature, for the gas as a mixture (gas.mixture)"""
 
 
 class SiteTable(_Table):

@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from mpm.arrays import Floats
-from mpm.case.model import Frozen
+from mpm.case.model import Flag, Frozen
 from mpm.physics.diffusion import EXPONENT, scaled_diffusivity
 from mpm.physics.fluidisation import mean_free_path
 from mpm.physics.gases import CARRIERS, GASES_VARY, ideal_gas_density, molar_density, symbol
@@ -75,6 +75,9 @@ class Gas(Frozen):
         "the carrier's at this temperature (Sutherland)", 0.0, example="0.0375 W/m/K"
     )
     """thermal conductivity of the gas; read where there is a table [energy]"""
+    mixture: Flag = False
+    """whether density, viscosity and diffusivities follow the composition of the gas, too; false: they are those of the carrier, which is
+    right where precursors are dilute. Read where there is a table [energy]"""
     _scaled: tuple[str, ...] = PrivateAttr(())
     _thermal: bool = PrivateAttr(False)
 
@@ -157,7 +160,7 @@ class Gas(Frozen):
     @model_serializer(mode="wrap")
     def _write_what_is_read(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
-        for key in ("heat_capacity", "conductivity"):
+        for key in ("heat_capacity", "conductivity", "mixture"):
             if not self._thermal and key not in self.model_fields_set:
                 table.pop(key, None)
         return table

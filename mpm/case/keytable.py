@@ -67,6 +67,7 @@ _TOGETHER = (
     ("gas.temperature", "energy", "energy.initial_temperature", "geometry.bed_temperature", "geometry.inlet.<name>.temperature"),
     tuple(f"geometry.wall.<name>.{key}" for key in ("temperature", "heat_flux", "heat_transfer_coefficient", "ambient")),
     ("energy.conductivity_model", "gas.conductivity", *(f"material.<name>.{key}" for key in ("conductivity", "effective_conductivity"))),
+    ("gas.mixture", "chemistry.species.<name>.viscosity", "chemistry.species.<name>.molar_mass", "gas.diffusivity"),
     ("gas.heat_capacity", "material.<name>.heat_capacity", "material.<name>.density"),
     ("material.<name>.pore_diameter", "material.<name>.permeability", "gas.pressure"),
     (*(f"chemistry.{k}.<name>.enthalpy" for k in ("species", "site", "film")), "chemistry.reaction.<name>.heat_of_reaction"),

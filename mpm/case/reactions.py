@@ -40,7 +40,12 @@ def build_mechanism(chemistry: Chemistry) -> Mechanism:
     """
     species = {
         name: Species(
-            name, table.molar_mass, _elements("species", name, table), table.enthalpy, table.heat_capacity
+            name,
+            table.molar_mass,
+            _elements("species", name, table),
+            table.enthalpy,
+            table.heat_capacity,
+            table.viscosity,
         )
         for name, table in chemistry.species.items()
     }

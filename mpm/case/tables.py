@@ -65,6 +65,13 @@ class CaseTables(Frozen):
         """Fill in temperatures that are left out, and see that heat has what it takes; without [energy] nothing may ask for it."""
         if self.energy is None:
             without_energy(self.geometry)
+            if self.gas.mixture:
+                raise reject(
+                    "true in a case without a table [energy]",
+                    "true in one with [energy], which may be empty: density then follows temperature and composition",
+                    key="gas.mixture",
+                    given="",
+                )
             return
         self.gas.complete_thermal()
         self.energy.complete(self.gas.temperature)

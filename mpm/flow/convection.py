@@ -37,12 +37,13 @@ MASS = np.array([[1.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 1.0 / 3.0]])
 
 
 class Convection:
-    """N(u) and its derivative for a gas of `density` [kg/m3], the case's own, on the fluxes of `space`. All methods are collective.
+    """N(u) and its derivative on the fluxes of `space`, for a gas whose flux has this `density` [kg/m3], one value or one per local cell.
+    All methods are collective.
 
     What this rank knows are its own cells and the faces that it owns; `_force` adds up what neighbours know of a flux.
     """
 
-    def __init__(self, space: FlowSpace, density: float):
+    def __init__(self, space: FlowSpace, density: float | Floats):
         self.space = space
         self._products = terms = _Products(space, density)
         local = len(space.weights)
@@ -123,7 +124,7 @@ class _Products:
     pairs.
     """
 
-    def __init__(self, space: FlowSpace, density: float):
+    def __init__(self, space: FlowSpace, density: float | Floats):
         self.space, strip = space, space.strip
         grid, own = strip.grid, strip.owned
         eps, width = strip.porosity, grid.dx

@@ -18,6 +18,8 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.flow.state import GasState, gas_amount
 from mpm.parallel import largest, total
+from mpm.physics.mixture import Fractions
+from mpm.physics.roles import Roles
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -36,60 +38,63 @@ class Density:
 
     def __init__(self, case: Case, strip: Strip, temperature: Floats, same: float = SAME):
         self.case, self.strip, self._same = case, strip, same
-        self.gas = GasState.of(case, strip, temperature)
+        roles = Roles.of(case.mechanism, set(case.fed_species))
+        self.names = sorted((*roles.coupled, *roles.products)) if case.gas.mixture else []
+        nothing = dict.fromkeys(self.names, np.zeros(strip.owned))
+        self.gas = GasState.of(case, strip, temperature, nothing)
         self._amount = gas_amount(strip, self.gas.relative)
         self.changed = False
         self.source = np.zeros(strip.owned)
 
-    def follow(self, temperature: Floats, dt: float) -> None:
-        """Take over the `temperature` of own cells [K] for a step of `dt` [s]; collective."""
-        new = GasState.of(self.case, self.strip, temperature, self._amount)
-        own = slice(0, self.strip.owned)
-        moved = np.abs(new.relative[own] / self.gas.relative[own] - 1.0).max(initial=0.0)
-        self.changed = bool(largest(self.strip.comm, [moved])[0] > self._same)
+    def follow(self, temperature: Floats, fractions: Fractions, dt: float) -> None:
+        """Take over the `temperature` of own cells [K] and the mole `fractions` of a mixture for a step of `dt` [s]; collective."""
+        new, old, own = self._state(temperature, fractions), self.gas, slice(0, self.strip.owned)
+        most = max(
+            np.abs(new.relative[own] / old.relative[own] - 1.0).max(initial=0.0),
+            np.abs(new.mass[own] / old.mass[own] - 1.0).max(initial=0.0),
+        )
+        self.changed = bool(largest(self.strip.comm, [most])[0] > self._same)
         self.source = np.zeros(self.strip.owned)
         if self.changed:
-            lost = self.gas.relative[own] - new.relative[own]
+            lost = old.relative[own] - new.relative[own]
             self.source = lost * self.strip.gas_volume[own] / dt
             self.gas = new
 
-    def take(self, temperature: Floats) -> None:
-        """Be in the steady state at the `temperature` of own cells [K]; collective."""
-        self.gas = GasState.of(self.case, self.strip, temperature, self._amount)
+    def take(self, temperature: Floats, fractions: Fractions) -> None:
+        """Be in the steady state at the `temperature` of own cells [K] and with these mole fractions of a mixture; collective."""
+        self.gas = self._state(temperature, fractions)
+
+    def _state(self, temperature: Floats, fractions: Fractions) -> GasState:
+        chosen = {name: fractions[name] for name in self.names}
+        return GasState.of(self.case, self.strip, temperature, chosen, self._amount)
 
     def stored(self) -> dict[str, Any]:
         """Arrays of a restart state, in grid order on rank 0."""
-        own = self.strip.owned
-        return {
-            "density": self.strip.scatter.to_root(
-                np.stack([self.gas.temperature, self.gas.relative])[:, :own]
-            ),
-            "amount": self._amount,
-            "changed": self.changed,
-        }
+        return {"density": self.store(self.gas), "amount": self._amount, "changed": self.changed}
 
     def restore(self, stored: dict[str, Any]) -> None:
         """The inverse of `stored`, on every rank."""
-        self.gas = restored_state(self.case, stored["density"][:, self.strip.cell])
+        self.gas = self.restored(stored["density"])
         self._amount, self.changed = float(stored["amount"]), bool(stored["changed"])
 
+    def store(self, gas: GasState) -> Floats | None:
+        """A state for a restart, in grid order on rank 0 (None elsewhere); collective."""
+        return self.strip.scatter.to_root(gas.stored(self.strip.owned))
 
-def restored_state(case: Case, values: Floats) -> GasState:
-    """The state with these temperatures and relative densities (2, local cells)."""
-    temperature, relative = values
-    pressure = 1.0
-    if not case.geometry.outlets and len(temperature):
-        pressure = float(relative[0] * temperature[0] / case.gas.temperature)
-    return GasState(temperature, relative, case.gas.viscosity_at(temperature), case.gas.density, pressure)
+    def restored(self, stored: Floats) -> GasState:
+        """The inverse of `store`, on every rank."""
+        return GasState.restored(self.case, self.strip, stored, self.names)
 
 
-def moved(strip: Strip, temperature: Floats, since: Floats) -> float:
-    """Largest mean over a layer of |T/T_then - 1| of own cells; collective."""
-    own, grid = strip.owned, strip.grid
-    layer, weights = grid.row_layer[strip.row[:own]], strip.volume[:own]
+def moved(strip: Strip, now: GasState, then: GasState) -> float:
+    """Largest mean over a layer of |T/T_then - 1|, and of that of the molar mass of a mixture; collective."""
+    own, grid = slice(0, strip.owned), strip.grid
+    layer, weights = grid.row_layer[strip.row[own]], strip.volume[own]
     count = len(grid.layer_names)
-    change = np.abs(temperature[:own] / since[:own] - 1.0)
-    sums = total(
-        strip.comm, [np.bincount(layer, change * weights, count), np.bincount(layer, weights, count)]
+    warmer, heavier = (
+        np.abs(new[own] / old[own] - 1.0)
+        for new, old in ((now.temperature, then.temperature), (now.mass, then.mass))
     )
-    return float((sums[0] / sums[1]).max())
+    rows = [np.bincount(layer, change * weights, count) for change in (warmer, heavier)]
+    *sums, volume = total(strip.comm, [*rows, np.bincount(layer, weights, count)])
+    return float(np.max(np.stack(sums) / volume))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import ufl
 from ufl import Form
 
+from mpm.arrays import Floats
 from mpm.flow.space import CLOSED, FlowSpace
 from mpm.flow.terms import Medium, bed_entrainment, drag, frame_acceleration, inertia, viscosity, weight
 from mpm.mesh.strip import Strip
@@ -26,6 +27,10 @@ class FlowForms:
 
     def __init__(self, case: Case, strip: Strip, space: FlowSpace, gas: GasState | None):
         self.space, self._medium = space, Medium.from_case(case, strip, gas)
+        # what a unit of flux weighs: the fluxes count volumes in the state of the case
+        self.inertial_density: float | Floats = case.gas.density
+        if gas is not None:
+            self.inertial_density = gas.reference * gas.mass
         m, u, v = self._medium, ufl.TrialFunction(space.fluxes), ufl.TestFunction(space.fluxes)
         closed = ufl.Measure("ds", domain=strip.mesh, subdomain_data=space.facets)(CLOSED)
         self.viscous = self._of_fluxes(viscosity(u, v, m, closed) + drag(u, v, m))

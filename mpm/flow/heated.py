@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mpm.arrays import Floats
-from mpm.flow.density import Density, moved, restored_state
+from mpm.flow.density import Density, moved
 from mpm.flow.factors import STEADY
 from mpm.flow.fields import FlowField
 from mpm.flow.given import spreading
@@ -23,6 +23,7 @@ from mpm.flow.state import GasState
 from mpm.motion.kinematics import BedMotion, StepMotion
 from mpm.motion.schedule import RESTING, Schedule, Step
 from mpm.parallel import total
+from mpm.physics.mixture import Fractions
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -110,14 +111,15 @@ class HeatedCycle:
             self._problem = self._new_problem(self.found_in)
         return self._problem
 
-    def follow(self, temperature: Floats, step: Step) -> None:
-        """Let the density follow the `temperature` of own cells [K] during `step`; collective. Raises ConvergenceError."""
+    def follow(self, temperature: Floats, fractions: Fractions, step: Step) -> None:
+        """Let the density follow the `temperature` of own cells [K] and the mole `fractions` of a mixture during `step`; collective. Raises
+        ConvergenceError."""
         density, was_driven = self.density, self._driven
-        density.follow(temperature, step.dt)
+        density.follow(temperature, fractions, step.dt)
         self._driven = density.changed
         if not (density.changed or was_driven):
             return
-        if moved(self.strip, self.gas.temperature, self.found_in.temperature) > self._update:
+        if moved(self.strip, self.gas, self.found_in) > self._update:
             self.find(vibrates=step.phase != RESTING)
         self._drive(density.source)
 
@@ -159,13 +161,13 @@ class HeatedCycle:
     def stored(self) -> dict[str, Any]:
         """Arrays of a restart state, in grid order on rank 0 (None elsewhere); collective."""
         own, scatter = self.strip.owned, self.strip.scatter
-        cycle, then = self._cycle, self.found_in
+        cycle = self._cycle
         more = np.zeros((4, own)) if self._more is None else self._more[:, :own]
         return {
             **self.density.stored(),
             "fields": scatter.to_root(cycle.stored(own)),
             "rests": cycle.at_rest is not None,
-            "found_in": scatter.to_root(np.stack([then.temperature, then.relative])[:, :own]),
+            "found_in": self.density.store(self.found_in),
             "more": scatter.to_root(more),
             "driven": self._driven,
             "way": scatter.to_root(np.vstack([self._way[:, :own], self._source])),
@@ -176,7 +178,7 @@ class HeatedCycle:
         """The inverse of `stored`, on every rank, after `steps`."""
         self.density.restore(stored)
         self.cycle = CyclicFlow.restored(self.strip, stored["fields"], bool(stored["rests"]))
-        self.found_in = restored_state(self.case, stored["found_in"][:, self.strip.cell])
+        self.found_in = self.density.restored(stored["found_in"])
         more = np.ascontiguousarray(stored["more"][:, self.strip.cell])
         self._more = more if stored["more"].any() else None
         self._driven, self._age = bool(stored["driven"]), int(stored["age"])

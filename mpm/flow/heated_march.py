@@ -8,12 +8,13 @@ import numpy as np
 
 from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
-from mpm.flow.density import Density, moved, restored_state
+from mpm.flow.density import Density, moved
 from mpm.flow.fields import FlowField, mean_field
 from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
 from mpm.flow.state import GasState
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
 from mpm.motion.schedule import Schedule, Step
+from mpm.physics.mixture import Fractions
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -50,10 +51,10 @@ class HeatedMarch:
             )
         return self._problems[step.whole]
 
-    def follow(self, temperature: Floats, step: Step) -> None:
-        """Let the density follow the `temperature` of own cells [K] during `step`; collective."""
-        self.density.follow(temperature, step.dt)
-        if moved(self.strip, self.gas.temperature, self.found_in.temperature) > self._update:
+    def follow(self, temperature: Floats, fractions: Fractions, step: Step) -> None:
+        """Let the density follow the `temperature` of own cells [K] and the mole `fractions` of a mixture during `step`; collective."""
+        self.density.follow(temperature, fractions, step.dt)
+        if moved(self.strip, self.gas, self.found_in) > self._update:
             for problem in self._problems.values():
                 problem.destroy()
             self.found_in, self._problems = self.gas, {}
@@ -89,12 +90,12 @@ class HeatedMarch:
 
     def stored(self) -> dict[str, Any]:
         """Arrays of a restart state, in grid order on rank 0 (None elsewhere); collective."""
-        own, scatter, then = self.strip.owned, self.strip.scatter, self.found_in
+        own, scatter = self.strip.owned, self.strip.scatter
         fields = np.stack([field.stored(own) for field in (self.current, *self.recent)])
         return {
             **self.density.stored(),
             "fields": scatter.to_root(fields),
-            "found_in": scatter.to_root(np.stack([then.temperature, then.relative])[:, :own]),
+            "found_in": self.density.store(self.found_in),
             "source": scatter.to_root(self._source),
             "done": self.done,
         }
@@ -103,6 +104,6 @@ class HeatedMarch:
         """The inverse of `stored`, on every rank."""
         self.density.restore(stored)
         self.current, *self.recent = [FlowField.restored(self.strip, field) for field in stored["fields"]]
-        self.found_in = restored_state(self.case, stored["found_in"][:, self.strip.cell])
+        self.found_in = self.density.restored(stored["found_in"])
         self._source = stored["source"][self.strip.cell[: self.strip.owned]]
         self.done, self._problems = int(stored["done"]), {}

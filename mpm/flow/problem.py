@@ -73,7 +73,7 @@ class FlowProblem:
         self.convection_share = 1.0  # below 1 on the way to a fast flow
         self._forms = forms = FlowForms(case, strip, self.space, gas)
         self.viscous, self._factors = forms.viscous, Factors(forms, self.space)
-        self.convection = Convection(self.space, case.gas.density)
+        self.convection = Convection(self.space, forms.inertial_density)
         self.unbalanced, self._work = (self.viscous.createVecLeft() for _ in range(2))
         self._psi, self._rhs = (self.space.curl.createVecRight() for _ in range(2))
         give_back(strip.comm)  # what forms take while they are assembled is as much as a factor

@@ -68,7 +68,7 @@ class Medium:
         functions = {name: strip.cell_values(values, name) for name, values in cells.items()}
         if gas is None:
             return cls(density=case.gas.density, buoyant=None, width=grid.dx, **functions)
-        density = strip.cell_values(gas.reference * gas.relative, "density")
+        density = strip.cell_values(gas.density, "density")
         buoyant = strip.cell_values(gas.buoyant, "buoyant")
         return cls(density=density, buoyant=buoyant, width=grid.dx, **functions)
 

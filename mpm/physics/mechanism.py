@@ -31,14 +31,15 @@ STANDARD_TEMPERATURE = 298.15
 
 @dataclass(frozen=True)
 class Species:
-    """A gas species: molar mass [kg/mol], atoms per molecule; if known, enthalpy of formation at 298.15 K [J/mol] and heat capacity
-    [J/mol/K]."""
+    """A gas species: molar mass [kg/mol], atoms per molecule; if known, enthalpy of formation at 298.15 K [J/mol], heat capacity
+    [J/mol/K] and viscosity at the temperature of `[gas]` [Pa s]."""
 
     name: str
     molar_mass: float
     elements: Mapping[str, float]
     enthalpy: float | None = None
     heat_capacity: float | None = None
+    viscosity: float | None = None
 
 
 @dataclass(frozen=True)

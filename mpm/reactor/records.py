@@ -101,7 +101,7 @@ def local_fields(system: System) -> dict[str, Floats]:
     fields["pressure"] = velocity.pressure[:own]
     if warm is not None:
         fields["temperature"] = warm.heat.temperature
-        fields["density"] = warm.gas.reference * relative
+        fields["density"] = warm.gas.density[:own]
     return fields
 
 

@@ -21,6 +21,7 @@ from mpm.flow.sequence import Watch
 from mpm.flow.state import GasState, gas_amount
 from mpm.motion.schedule import Schedule, Step
 from mpm.parallel import largest
+from mpm.physics.mixture import Fractions
 from mpm.reactor.steady.overturning import Overturning
 from mpm.report.records import HeatTotals
 from mpm.transport.heat import Heat, HeatMemento
@@ -88,6 +89,8 @@ class Thermal:
     def find_flow(self, watch: Watch | None = None) -> None:
         """Find the flow in the present state; in the steady one the temperatures that go with it, too. Raises ConvergenceError."""
         if isinstance(self.flow, HeatedCycle):
+            if self.case.fidelity == "steady":
+                self.flow.density.take(self.heat.temperature, self._fractions())
             self.flow.find(watch)
             if self.case.fidelity == "steady":
                 self._settle_flow(self.flow)
@@ -112,7 +115,7 @@ class Thermal:
                 continue
             problem.change(psi)
             heat.excess = heat.excess + warmer
-            flow.density.take(heat.temperature)
+            flow.density.take(heat.temperature, self._fractions())
             flow.adopt(problem.field(), motion)
             if change < SETTLED:
                 return
@@ -151,7 +154,7 @@ class Thermal:
         """The bed has slid by so many `columns`: let density, flow and rates follow; the field of the step. Raises ConvergenceError."""
         self.heat.slide(columns, self.gas)
         self._before = self.gas
-        self.flow.follow(self.heat.temperature, step)
+        self.flow.follow(self.heat.temperature, self._fractions(), step)
         if self.gas is not self._before:
             self.transport.follow(self.gas)
         if self.flow.changed:
@@ -169,6 +172,19 @@ class Thermal:
             self._operators[field] = self.heat.fluxes.operator(field, self.gas)
         made, carried = self._given_off(), self._carried()
         self.heat.advance(self._operators[field], self._before, self.gas, dt, made, recurs, carried)
+
+    def _fractions(self) -> Fractions:
+        """Mole fractions of the species in own cells, at present."""
+        whole = self.case.gas.molar_density * self.gas.relative[: self.strip.owned]
+        return dict(zip(self.transport.names, self.transport.concentration / whole, strict=True))
+
+    def unmixed(self) -> float:
+        """How far the steady flow is from one of the present composition: the largest relative change of the density; collective."""
+        mixed = GasState.of(
+            self.case, self.strip, self.heat.temperature, self._fractions() if self.case.gas.mixture else {}
+        )
+        change = np.abs(mixed.mass / self.gas.mass - 1.0).max(initial=0.0)
+        return float(largest(self.strip.comm, [change])[0])
 
     def _carried(self) -> list[Diffusing]:
         """The species whose heat capacity is known, as they diffuse now; collective."""

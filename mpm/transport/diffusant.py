@@ -14,6 +14,7 @@ from mpm.arrays import Floats
 from mpm.flow.state import GasState
 from mpm.mesh.strip import Strip
 from mpm.physics.diffusion import thermal_diffusion
+from mpm.physics.mixture import diffusivity_ratio
 from mpm.transport.fluxes import FluxAssembler, cell_diffusivity, face_conductance
 
 if TYPE_CHECKING:
@@ -23,17 +24,19 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, order=True)
 class Diffusant:
     """All that decides it: the diffusivity in the gas of the case [m2/s] and, where pores are narrow or Soret counts, the molar mass
-    [kg/mol], which is else 0: species that spread alike share their matrices."""
+    [kg/mol], which is else 0; in a mixture its name, which is else empty. Species that spread alike share their matrices."""
 
     diffusivity: float
     molar_mass: float
+    mixed: str = ""
 
     @classmethod
     def of(cls, case: Case, species: str) -> Diffusant:
         """That of a species of the case."""
         narrow = any(layer.material and layer.material.pore_diameter for layer in case.geometry.layers)
         heavy = narrow or (case.energy is not None and case.energy.soret)
-        return cls(case.gas.diffusivity[species], case.mechanism.get(species).molar_mass if heavy else 0.0)
+        mass = case.mechanism.get(species).molar_mass if heavy else 0.0
+        return cls(case.gas.diffusivity[species], mass, species if case.gas.mixture else "")
 
     def assembler(
         self, case: Case, strip: Strip, gas: GasState | None, dispersion: Floats | float
@@ -44,6 +47,11 @@ class Diffusant:
             effective = cell_diffusivity(strip, self.diffusivity, self.molar_mass, case.gas.temperature)
             return FluxAssembler(case, strip, effective + dispersion)
         free = self.diffusivity * case.gas.diffusivity_factor(gas.temperature) / gas.pressure
+        if self.mixed:
+            carrier, species = case.gas, case.mechanism.species
+            free = free * diffusivity_ratio(
+                self.mixed, species, carrier.carrier, carrier.molar_mass, gas.fractions
+            )
         effective = cell_diffusivity(strip, free, self.molar_mass, gas.temperature)
         drift = self._drift(case, strip, gas) if case.energy is not None and case.energy.soret else None
         return FluxAssembler(case, strip, gas.relative * (effective + dispersion), gas.relative, drift)

@@ -12,6 +12,7 @@ from mpm.reactor.system import System
 from mpm.reactor.thermal import Thermal
 
 SETTLED = 0.01  # K: a change of temperature that species need not follow
+MIXED = 1e-4  # relative change of the density of a mixture that the flow need not follow
 ROUNDS = 10
 
 
@@ -32,7 +33,7 @@ class ThermalSteady:
             self.iterations += self._inner.iterations
             self._inner.hand_over()
             self._handed_over = True
-            if self.thermal.settle() < SETTLED:
+            if self.thermal.settle() < SETTLED and self.thermal.unmixed() < MIXED:
                 return
             system.transport.ledger.recall(empty)
             system.find_flow()
