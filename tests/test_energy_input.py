@@ -417,3 +417,18 @@ def test_the_sketch_shows_walls_that_give_or_take_heat() -> None:
         assert floor[1:19] == line * 18 and floor.count(line) == 18
         assert f"{line * 3}: walls that give or take heat; heat passes the right" in lines[-1]
     assert not any("heat" in text for text in sketch(load_case("single_zone"), 80))
+
+
+def test_time_in_which_walls_warm_the_bed() -> None:
+    """Fails when the way of heat from the walls is off: C h/(sum of 1/R), R of the layers between and half of the bed, by covered
+    length."""
+    case = load_case("heating")
+    report = check_case(case)["energy"]
+    layers, geometry = report["layers"], case.geometry
+    k = {name: numbers["conductivity"] for name, numbers in layers.items()}
+    half = 1.5e-3 / k["bed"]
+    below = 5e-3 / k["plenum"] + 1.59e-3 / k["frit"] + half
+    above = 12.7e-3 / k["headspace"] + half
+    passed = (geometry.length - 8e-3) / geometry.length / below
+    passed += (geometry.length - 10e-3) / geometry.length / above
+    assert report["bed"]["wall_time"] == pytest.approx(layers["bed"]["heat_capacity"] * 3e-3 / passed)

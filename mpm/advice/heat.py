@@ -54,7 +54,32 @@ def energy_report(case: Case, energy: Energy) -> dict[str, Any]:
     moving = case.geometry.moving_layer
     if moving is not None:
         report["bed"] = _bed(case, moving, report["layers"][moving.name])
+        report["bed"] |= _walls(case, moving, report["layers"])
     return report
+
+
+def _walls(case: Case, bed: Layer, layers: dict[str, Any]) -> dict[str, float]:
+    """C h/sum 1/R [s], in which walls below and above that have a temperature warm the bed through all that lies between.
+
+    R = sum h_i/k_i [m2 K/W] of the layers between, half of the bed and the wall's own 1/h; gas that conducts alone: where it turns over,
+    less. Absent where no wall has a temperature.
+    """
+    order = [layer.name for layer in case.geometry.layers]
+    place = order.index(bed.name)
+    passed = 0.0
+    for side, between in (
+        ("bottom", case.geometry.layers[:place]),
+        ("top", case.geometry.layers[place + 1 :]),
+    ):
+        walls = [wall for wall in case.geometry.walls if wall.side == side and wall.heat_flux is None]
+        resistance = sum(layer.height / layers[layer.name]["conductivity"] for layer in between)
+        resistance += 0.5 * bed.height / layers[bed.name]["conductivity"]
+        for wall in walls:
+            own = 0.0 if wall.heat_transfer_coefficient is None else 1.0 / wall.heat_transfer_coefficient
+            passed += (wall.end - wall.start) / case.geometry.length / (resistance + own)
+    if passed == 0.0:
+        return {}
+    return {"wall_time": layers[bed.name]["heat_capacity"] * bed.height / passed}
 
 
 def _layer(case: Case, energy: Energy, layer: Layer) -> dict[str, Any]:

@@ -71,6 +71,8 @@ def heat_numbers(sheet: Sheet, report: dict[str, Any]) -> None:
         sheet.add("heat through the bed, h^2/alpha", number(bed["diffusion_time"], "s"))
     if "residence_over_diffusion_time" in bed:
         sheet.add("time of the bed in the strip over that", number(bed["residence_over_diffusion_time"]))
+    if "wall_time" in bed:
+        sheet.add("walls warm the bed, through what is between", number(bed["wall_time"], "s"))
     if "exchange_time" in bed:
         sheet.add("heat from gas to particles", number(bed["exchange_time"] * 1e3, "ms"))
     for name, numbers in energy["layers"].items():
