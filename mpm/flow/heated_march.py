@@ -10,6 +10,7 @@ from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
 from mpm.flow.density import Density, moved
 from mpm.flow.fields import FlowField, mean_field
+from mpm.flow.given import spreading
 from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
 from mpm.flow.state import GasState
 from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
@@ -67,7 +68,10 @@ class HeatedMarch:
             problem.start_from(self.current, self._ports(step.index), self._source)
             problem.step(self._motion(step), source=self.density.source)
             reached = problem.field()
-            check_bounded(self.case, self.strip, self.current.velocities, reached.velocities, problem.dt)
+            straight = problem.space.velocities(spreading(problem.space, self.density.source))
+            driven = float(np.abs(straight).max(initial=0.0))
+            before, after = self.current.velocities, reached.velocities
+            check_bounded(self.case, self.strip, before, after, problem.dt, self.gas, driven)
             self.current, self._source = reached, self.density.source
             self.done += 1
             self.recent = [*self.recent, reached][-self.schedule.phases :]

@@ -230,7 +230,7 @@ class FlowProblem:
             self._iterate(STEADY, tolerance)
         self._adopt()
         change = self.space.fastest(self._work.array)
-        fastest = max(self.space.fastest(self.values), STILL * driving_speed(self.case))
+        fastest = max(self.space.fastest(self.values), STILL * driving_speed(self.case, self.gas))
         change, fastest = largest(self.strip.comm, [change, fastest])
         return float(change / fastest) if fastest > 0.0 else 0.0
 

@@ -26,6 +26,7 @@ from mpm.reactor.steady.overturning import Overturning
 from mpm.report.records import HeatTotals
 from mpm.transport.heat import Heat, HeatMemento
 from mpm.transport.heat_flux import Diffusing, HeatOperator
+from mpm.transport.plausible import plausible, require_plausible
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -64,6 +65,9 @@ class Thermal:
         self.heat = Heat(case, strip)
         self.flow: HeatedFlow = self._new_flow()
         self._operators: dict[FlowField, HeatOperator] = {}
+        self._steady_heat = np.zeros(
+            strip.owned
+        )  # of reactions when they were last in a steady state, in own cells [W/m]
         gas = case.gas.temperature
         reactions, mechanism = transport.reactions, case.mechanism
         self._surface_heat = [-mechanism.heat_of_reaction(r, gas) for r in reactions.surface.reactions]
@@ -107,10 +111,10 @@ class Thermal:
         for _ in range(STEPS):
             problem, operator = flow.problem, self._steady_operator()
             drawn = heat.fluxes.outlet_means(operator, heat.excess)
-            supply = heat.fluxes.steady_supply(operator, bed, self._booked(), drawn)
+            supply = heat.fluxes.steady_supply(operator, bed, self._steady_heat, drawn)
             psi, warmer = newton.step(problem, self.gas, motion, operator, supply, time)
             change = float(largest(self.strip.comm, [np.abs(warmer).max(initial=0.0)])[0])
-            if not change < FAR * spread:
+            if not change < FAR * spread or not plausible(self.case, self.strip, heat.temperature + warmer):
                 time *= SHORTER
                 continue
             problem.change(psi)
@@ -120,9 +124,10 @@ class Thermal:
             if change < SETTLED:
                 return
             time = NEVER if change < CLOSE * spread else time * (LONGER if change < STEEP * spread else 1.0)
+        require_plausible(self.case, self.strip, heat.temperature + warmer)
         raise ConvergenceError(
             f"steady state: temperatures still change by {change:.3g} K after {STEPS} steps of flow and heat; the gas may have no steady "
-            "flow where it is heated from below: try fidelity averaged"
+            "flow where it is heated from below, or nothing may take away what heats it: try fidelity averaged"
         )
 
     def settle(self) -> float:
@@ -130,7 +135,8 @@ class Thermal:
 
         Returns the largest change [K]; collective. Raises ConvergenceError.
         """
-        return self.heat.settle(self._steady_operator(), self.case.conveying_velocity, self._given())
+        self._steady_heat = self._given()
+        return self.heat.settle(self._steady_operator(), self.case.conveying_velocity, self._steady_heat)
 
     def book_second(self) -> None:
         """Enter one second of the steady state; collective."""

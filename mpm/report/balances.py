@@ -89,9 +89,10 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
     """Per element: what came in with gas and solids = what left with them + what is stored in the gas, on surfaces and in the film.
 
     The carrier takes no part. Relative to the largest of these terms, or to 1e-6 of the atoms on the solids (of the sites when nothing has
-    been fed) when all are smaller.
+    been fed), or of the run's largest feed when all are smaller.
     """
     mechanism = case.mechanism
+    largest = float(totals.fed.sum(axis=0).max(initial=0.0))
     errors = {}
     elements = sorted(
         {
@@ -124,7 +125,7 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
         )
         if not totals.fed.any():
             on_solids = max(on_solids, totals.sites_initially.sum())
-        scale = max(FLOOR * float(on_solids), *(abs(t) for t in terms))
+        scale = max(FLOOR * max(float(on_solids), largest), *(abs(t) for t in terms))
         errors[element] = abs(sum(terms)) / scale if scale else 0.0
     return errors
 

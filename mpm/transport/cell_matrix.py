@@ -20,6 +20,9 @@ FALL = 1e-13  # of a residual, where it is not below what a step may leave befor
 FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
 
 
+TRACE = 1e-10  # of what there is: what a step may leave of a species that is there in traces, which balance to 1e-9, too
+
+
 class FacePattern:
     """Which own cell is coupled to which neighbour, face by face from either side, and what flux operators enter there."""
 
@@ -115,6 +118,7 @@ class StepMatrix:
         self._krylov = KrylovSolver(self.cells.matrix, name, 0.0, fill=fill)
         least = residual / np.sqrt(max(self.cells.matrix.size[0], 1))
         self._krylov.ksp.setTolerances(rtol=fall, atol=least)
+        self._least, self._heated = least, fall == FALL_HEATED
         self._serving: ServingSolver | None = None  # once the matrix recurs
         self._x, self._y = self.cells.matrix.createVecs()
 
@@ -145,5 +149,10 @@ class StepMatrix:
             self._serving.solve(self._y, self._x, self._holds)
         else:
             self._x.array[:] = guess
+            if self._heated:  # no factor serves twice, by which traces would be exact
+                size = float(self._y.norm())
+                if size == 0.0:
+                    return np.zeros_like(rhs)
+                self._krylov.ksp.atol = min(self._least, TRACE * size)
             self._krylov.solve(self._y, self._x, guess=True)
         return np.array(self._x.array)

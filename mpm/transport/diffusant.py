@@ -53,13 +53,25 @@ class Diffusant:
                 self.mixed, species, carrier.carrier, carrier.molar_mass, gas.fractions
             )
         effective = cell_diffusivity(strip, free, self.molar_mass, gas.temperature)
-        drift = self._drift(case, strip, gas) if case.energy is not None and case.energy.soret else None
+        drift = None
+        if case.energy is not None and case.energy.soret:
+            drift = self._drift(case, strip, gas, hindered(effective, cell_diffusivity(strip, free)))
         return FluxAssembler(case, strip, gas.relative * (effective + dispersion), gas.relative, drift)
 
-    def _drift(self, case: Case, strip: Strip, gas: GasState) -> Floats:
-        """-S^eff grad ln T over the molar density of the case, through the faces inside (faces,) [m/s]: heavy species drift to the cold."""
+    def _drift(self, case: Case, strip: Strip, gas: GasState, hindered: Floats) -> Floats:
+        """-S^eff grad ln T over the molar density of the case, through the faces inside (faces,) [m/s]: heavy species drift to the cold.
+
+        Molecules that meet walls before they meet others do not separate: the drift is `hindered` (2, local cells) as diffusion is.
+        """
         free = thermal_diffusion(self.molar_mass, case.gas.molar_mass, gas.temperature)
         towards_cold = 1.0 if self.molar_mass > case.gas.molar_mass else -1.0
-        through = face_conductance(strip, cell_diffusivity(strip, np.abs(free) / case.gas.molar_density))
+        through = face_conductance(
+            strip, cell_diffusivity(strip, np.abs(free) / case.gas.molar_density) * hindered
+        )
         warmth = np.log(gas.temperature)
         return np.asarray(-towards_cold * through * (warmth[strip.faces.ahead] - warmth[strip.faces.behind]))
+
+
+def hindered(diffusivity: Floats, free: Floats) -> Floats:
+    """Diffusivity over that without walls of pores, 1 where nothing diffuses."""
+    return np.divide(diffusivity, free, out=np.ones_like(diffusivity), where=free > 0.0)

@@ -54,12 +54,13 @@ def cell_diffusivity(
 ) -> Floats:
     """D_eff along x and y in every local cell, (2, cells) [m2/s], of a gas with this `diffusivity` [m2/s], one value or one per cell.
 
-    Where a solid has a pore_diameter, a gas of this `molar_mass` [kg/mol] meets its walls, too (Bosanquet), at the `temperature` [K].
+    Where a solid has a pore_diameter, a gas of this `molar_mass` [kg/mol] meets its walls, too (Bosanquet), at the `temperature` [K]; one
+    without `molar_mass` does not.
     """
     grid = strip.grid
     along_x = grid.per_row(lambda solid: solid.tortuosity_factor[0], gas=1.0)[strip.row]
     along_y = grid.per_row(lambda solid: solid.tortuosity_factor[1], gas=1.0)[strip.row]
-    if any(solid is not None and solid.pore_diameter for solid in grid.materials):
+    if molar_mass and any(solid is not None and solid.pore_diameter for solid in grid.materials):
         width = grid.per_row(lambda solid: solid.pore_diameter or 0.0, gas=0.0)[strip.row]
         free = np.broadcast_to(np.asarray(diffusivity, dtype=float), width.shape)
         hot = np.broadcast_to(np.asarray(temperature, dtype=float), width.shape)

@@ -28,6 +28,7 @@ from mpm.transport.columns import Beyond, SlidingColumns
 from mpm.transport.conduction import solid_capacity
 from mpm.transport.heat_flux import Diffusing, HeatFluxes, HeatOperator
 from mpm.transport.heat_ledger import HeatLedger, HeatPassed
+from mpm.transport.plausible import require_plausible
 from mpm.transport.tracers import steady_fields
 
 from mpi4py import MPI  # isort: skip  (after the finite-element stack)
@@ -124,7 +125,11 @@ class Heat:
         lost = (after.relative - before.relative)[own] * self.strip.gas_volume[own]
         given = made / dt + self.fluxes.diffusing(carried, self.excess)
         rhs = (held - lost) * self.excess / dt + self.fluxes.supply(operator, drawn) + given / self.unit
-        self.excess = self._matrix.solve(rhs, self.excess, recurs)
+        # for the change: errors are relative to that, not to all that hot solids hold
+        imbalance = rhs - self._matrix.multiply(self.excess)
+        change = self._matrix.solve(imbalance, np.zeros_like(self.excess), recurs)
+        require_plausible(self.case, self.strip, self.temperature + change)
+        self.excess = self.excess + change
         self.book(operator, drawn, dt, total_of(self.strip.comm, made))
 
     def settle(self, operator: HeatOperator, solids: float, made: Floats) -> float:
@@ -132,7 +137,9 @@ class Heat:
         `made` (own,) [W/m]; returns the largest change of a temperature [K]. Collective. Raises ConvergenceError.
         """
         supply = self.fluxes.steady_supply(operator, solids, made, {})
-        before, self.excess = self.excess, steady_fields(self.strip, [operator.fluxes], supply[None])[0]
+        settled = steady_fields(self.strip, [operator.fluxes], supply[None])[0]
+        require_plausible(self.case, self.strip, self.reference + settled)
+        before, self.excess = self.excess, settled
         return float(largest(self.strip.comm, [np.abs(self.excess - before).max(initial=0.0)])[0])
 
     def book_second(self, operator: HeatOperator, solids: float, made: Floats) -> None:
