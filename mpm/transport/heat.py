@@ -128,7 +128,7 @@ class Heat:
         # for the change: errors are relative to that, not to all that hot solids hold
         imbalance = rhs - self._matrix.multiply(self.excess)
         change = self._matrix.solve(imbalance, np.zeros_like(self.excess), recurs)
-        require_plausible(self.case, self.strip, self.temperature + change)
+        require_plausible(self.fluxes.case, self.strip, self.temperature + change)
         self.excess = self.excess + change
         self.book(operator, drawn, dt, total_of(self.strip.comm, made))
 
@@ -138,7 +138,7 @@ class Heat:
         """
         supply = self.fluxes.steady_supply(operator, solids, made, {})
         settled = steady_fields(self.strip, [operator.fluxes], supply[None])[0]
-        require_plausible(self.case, self.strip, self.reference + settled)
+        require_plausible(self.fluxes.case, self.strip, self.reference + settled)
         before, self.excess = self.excess, settled
         return float(largest(self.strip.comm, [np.abs(self.excess - before).max(initial=0.0)])[0])
 

@@ -1,0 +1,197 @@
+"""Faults of heated runs that random cases found."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mpm.case.case import Case
+from mpm.errors import ConvergenceError
+from mpm.reactor.reactor import Reactor
+from mpm.report.balances import balance_errors, element_balances
+from mpm.transport.diffusant import Diffusant
+
+from .cases import MPI, TINY, heat_of, run, strip_case, wall, zone
+
+STILL = {"gamma": 0.0, "bed_velocity": "0 m/s", "start": "0 s"}
+GAS = {"name": "gas", "height": "3 mm", "cells": 4}
+OPEN = {"outlet": [{"name": "out", "center": "1.5 mm", "width": "1 mm"}]}
+WARM: dict[str, Any] = {
+    "energy": {},
+    "geometry.bed_temperature": "300 K",
+    "geometry.wall": [wall("top", temperature="600 K", end="95 mm")],
+}
+
+
+def gas_case(geometry: dict[str, Any], layer: dict[str, Any] = GAS, **tables: Any) -> Case:
+    """A strip of gas that is still."""
+    return strip_case(
+        [layer],
+        **{
+            "geometry": geometry,
+            "energy": {},
+            "motion": STILL,
+            "time": {"end": "2 s", "step": "20 ms"},
+            **tables,
+        },
+        output={"every": "1 s"},
+    )
+
+
+@pytest.mark.parametrize("heat", [False, True])
+def test_water_on_a_fresh_surface(heat: bool) -> None:
+    """Fails when rounding of methane, which nothing makes, counts as carbon that got lost."""
+    changes = {
+        "geometry.inlet.tma.mass_fractions": {"H2O": 1e-4},
+        "fidelity": "resolved",
+        "time.end": "0.3 s",
+    }
+    reactor, _ = run(zone({**changes, **(WARM if heat else {})}, TINY))
+    assert max(element_balances(reactor.case, reactor.totals()).values()) < 1e-9
+
+
+@pytest.mark.parametrize("fidelity", ["averaged", "resolved"])
+def test_traces_balance(fidelity: str) -> None:
+    """Fails when a product of which there is a millionth of the feed is known to no more digits than the feed."""
+    changes = {
+        **WARM,
+        "fidelity": fidelity,
+        "geometry.inlet.tma.mass_fractions": {"TMA": 1e-7, "H2O": 1e-7},
+        "geometry.inlet.tma.stop": "0.1 s",
+        "time.end": "0.4 s",
+    }
+    reactor, _ = run(zone(changes, TINY))
+    assert max(balance_errors(reactor.case, reactor.totals()).values()) < 1e-10
+
+
+def test_a_closed_inlet_feeds_nothing() -> None:
+    """Fails when the gas that heating drives out leaves by rounding through an inlet, which then feeds as much precursor."""
+    inlet = {
+        "name": "in",
+        "center": "1.5 mm",
+        "width": "1 mm",
+        "velocity": "0 m/s",
+        "mass_fractions": {"TMA": 1e-4},
+    }
+    walls = [wall("top", temperature="600 K", end="1 mm"), wall("bottom", temperature="300 K", end="1 mm")]
+    for fidelity in ("averaged", "resolved"):
+        case = gas_case({**OPEN, "inlet": [inlet], "wall": walls}, fidelity=fidelity, time={"end": "0.3 s"})
+        reactor, _ = run(case)
+        assert heat_of(reactor).gas_passed != 0.0
+        assert not reactor.totals().fed.any()
+
+
+def test_drift_in_narrow_pores() -> None:
+    """Fails when thermal diffusion and pores together are no number, or pores hinder diffusion and not the drift along with it."""
+    block = {
+        "porosity": 0.4,
+        "permeability": "1 um^2",
+        "tortuosity_factor": 2.0,
+        "surface_to_volume": "0 1/m",
+        "density": "2000 kg/m^3",
+        "heat_capacity": "800 J/kg/K",
+        "conductivity": "1 W/m/K",
+    }
+    ratios = []
+    for more in ({}, {"pore_diameter": "30 nm"}):
+        case = strip_case(
+            [{"name": "bed", "height": "2 mm", "cells": 2, "material": "block"}],
+            material={"block": {**block, **more}},
+            energy={"soret": True},
+        )
+        reactor = Reactor(case, MPI.COMM_SELF)
+        thermal, strip = reactor.system.thermal, reactor.system.strip
+        assert thermal is not None
+        thermal.heat.excess = np.linspace(0.0, 50.0, strip.owned)
+        thermal.flow.density.take(thermal.heat.temperature)
+        assembler = Diffusant.of(case, "TMA").assembler(case, strip, thermal.gas, 0.0)
+        assert assembler.drift is not None
+        there = assembler.drift != 0.0
+        ratios.append(assembler.drift[there] / assembler.conductance[there])
+    assert there.any()
+    np.testing.assert_allclose(ratios[1], ratios[0], rtol=0.05)
+
+
+def test_vibration_disperses_in_narrow_pores() -> None:
+    """Fails when dispersion in a bed with pore_diameter is no number."""
+    changes = {
+        "material.glass_beads.pore_diameter": "1 um",
+        "transport.vibrational_dispersion": True,
+        "fidelity": "steady",
+    }
+    run(zone(changes, TINY))
+
+
+def test_heat_of_reaction_in_a_steady_state() -> None:
+    """Fails when flow and temperature are found anew without the heat that reactions give off, round after round."""
+    changes = {
+        **WARM,
+        "fidelity": "steady",
+        "geometry.inlet.tma.mass_fractions": {"TMA": 0.02},
+        "material.glass_beads.site_density": "one-per-24-square-angstrom",
+        "chemistry.reaction.tma.heat_of_reaction": "-2000 kJ/mol",
+    }
+    reactor, result = run(zone(changes, TINY))
+    none = {"chemistry.reaction.tma.heat_of_reaction": "0 kJ/mol"}
+    _, without = run(zone({**changes, **none}, TINY))
+    assert heat_of(reactor).reaction > 1.0
+    assert (result.field("temperature") - without.field("temperature")).max() > 0.5
+
+
+@pytest.mark.parametrize("fidelity", ["averaged", "resolved", "steady"])
+def test_cooling_and_heating_without_end(fidelity: str) -> None:
+    """Fails when temperatures below zero, or of a star, end in a message about something else or in numbers that are none."""
+    cold = [wall("bottom", heat_flux="-30 kW/m^2")]
+    hot = {**GAS, "heating": "1e8 W/m^3"}
+    for case, said in (
+        (gas_case({"wall": cold}, fidelity=fidelity), "more heat is taken away than there is"),
+        (gas_case({**OPEN, "wall": cold}, fidelity=fidelity), "more heat is taken away than there is"),
+        (
+            gas_case(OPEN, hot, fidelity=fidelity),
+            "nothing may take away" if fidelity == "steady" else "nothing takes away as much heat",
+        ),
+    ):
+        with pytest.raises(ConvergenceError) as caught:
+            Reactor(case, MPI.COMM_SELF).run()
+        assert said in str(caught.value), caught.value
+
+
+@pytest.mark.parametrize("fidelity", ["averaged", "resolved"])
+def test_gas_that_a_flux_cools_stays_at_rest(fidelity: str) -> None:
+    """Fails when a closed strip whose temperatures no wall gives has no speed to measure the rest of its gas by."""
+    case = gas_case(
+        {"wall": [wall("bottom", heat_flux="-300 W/m^2")]},
+        fidelity=fidelity,
+        time={"end": "1 s", "step": "20 ms"},
+    )
+    reactor, result = run(case)
+    assert np.ptp(result.field("temperature")) > 1.0
+    assert np.abs(reactor.field("velocity")[..., 0]).max() < 1e-9
+
+
+def test_sudden_heat_drives_gas_out_of_an_impulsive_run() -> None:
+    """Fails when the gas that expands all at once is taken for a flow that diverges."""
+    walls = [wall("bottom", temperature="900 K"), wall("top", temperature="900 K", end="1 mm")]
+    case = gas_case(
+        {**OPEN, "wall": walls},
+        fidelity="resolved",
+        energy={"initial_temperature": "300 K", "buoyancy": False},
+        motion={**STILL, "startup": "impulsive"},
+        time={"end": "0.05 s"},
+    )
+    run(case)
+
+
+def test_heat_closes_where_hot_solids_hardly_change() -> None:
+    """Fails when what a step leaves is measured by all the heat that solids hold, not by what changes."""
+    layer = {"name": "bed", "height": "20 mm", "cells": 4, "material": "glass_beads"}
+    case = gas_case(
+        {"wall": [wall("bottom", heat_flux="1 kW/m^2")]},
+        layer,
+        fidelity="resolved",
+        gas={"temperature": "900 K"},
+        energy={"initial_temperature": "300 K"},
+        time={"end": "0.5 s"},
+    )
+    _, result = run(case)
+    assert result.summary["energy"]["balance_error"] < 1e-9
