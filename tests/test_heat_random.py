@@ -103,7 +103,7 @@ def test_drift_in_narrow_pores() -> None:
         thermal, strip = reactor.system.thermal, reactor.system.strip
         assert thermal is not None
         thermal.heat.excess = np.linspace(0.0, 50.0, strip.owned)
-        thermal.flow.density.take(thermal.heat.temperature)
+        thermal.flow.density.take(thermal.heat.temperature, {})
         assembler = Diffusant.of(case, "TMA").assembler(case, strip, thermal.gas, 0.0)
         assert assembler.drift is not None
         there = assembler.drift != 0.0
