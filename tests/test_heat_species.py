@@ -337,3 +337,13 @@ def test_heat_balances_where_species_bring_their_own() -> None:
         )
         fields.append(run(case)[1].field("temperature"))
     assert np.abs(fields[1] - fields[0]).max() > 0.1
+
+
+def test_dose_of_a_cold_inlet_is_what_it_feeds() -> None:
+    """Fails when the excess number counts molecules at another temperature than that of the port, where its velocity is measured."""
+    case = zone({**HEATED, "geometry.inlet.tma.temperature": "300 K", "fidelity": "steady"}, TINY)
+    _, result = run(case)
+    fed = result.summary["species"]["TMA"]["fed"]  # mol/m/s
+    bed = case.geometry.layers[2]
+    passing = 0.013 * bed.height * bed.solid.surface_to_volume * bed.solid.site_density
+    assert result.summary["excess_number"]["tma"] == pytest.approx(fed / passing, rel=1e-9)

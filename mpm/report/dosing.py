@@ -56,7 +56,8 @@ def inlet_excess(case: Case, inlet: Inlet) -> Excess | None:
     layer, species = case.geometry.moving_layer, case.precursor(inlet)
     if layer is None or layer.material is None or species is None or case.motion.mean_velocity == 0.0:
         return None
-    concentration = case.feed_concentrations(inlet.mass_fractions)[species]
+    # at the inlet's own temperature, as its velocity is
+    concentration = case.feed_concentrations(inlet.mass_fractions)[species] * case.inlet_density(inlet)
     material = layer.material
     if material.surface_to_volume == 0.0:
         return None
