@@ -14,15 +14,17 @@ from mpm.flow.cycle import mean_motion, periodic_flow
 from mpm.flow.factors import STEADY
 from mpm.flow.fields import FlowField, mean_field
 from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
-from mpm.flow.steady import steady_flow
+from mpm.flow.steady import CONVERGED, steady_flow
 from mpm.mesh.strip import Strip
-from mpm.motion.kinematics import BedMotion, StepMotion, step_motion
+from mpm.motion.kinematics import REST, BedMotion, StepMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
 Watch = Callable[[int, float], None]  # of a cycle's number and what has changed since the one before
+# last change of a velocity, relative to the fastest, of a flow that follows temperatures; Newton's next would be about its square
+FOLLOWED = 1e-2
 SAME_STEP = 1e-12  # of a step: how far two lengths may lie apart by rounding
 
 
@@ -73,16 +75,17 @@ class CyclicFlow:
         watch: Watch | None = None,
         guess: CyclicFlow | None = None,
     ) -> CyclicFlow:
-        """The same of a problem that is there and keeps its steady factor, starting from a similar flow as a `guess`.
+        """The same of a problem that is there and keeps its steady factor, starting from a similar flow as a `guess` that it follows.
 
         A guess without a field at rest asks for none. Raises ConvergenceError.
         """
         case, at_rest, last = problem.case, None, None if guess is None else guess.phases[-1]
+        converged = CONVERGED if guess is None else FOLLOWED
         if begins_at_rest(case, schedule) and (guess is None or guess.at_rest is not None):
-            at_rest = steady_flow(problem, guess=None if guess is None else guess.at_rest)
+            at_rest = steady_flow(problem, REST, None if guess is None else guess.at_rest, converged)
         if case.fidelity == "resolved":
             return cls(at_rest, periodic_flow(problem, bed_motion, schedule.phases, watch, last, STEADY))
-        return cls(at_rest, [steady_flow(problem, mean_motion(bed_motion), last)])
+        return cls(at_rest, [steady_flow(problem, mean_motion(bed_motion), last, converged)])
 
     def at(self, step: Step) -> FlowField:
         """The field of the step's phase."""

@@ -21,7 +21,12 @@ SHARE_LIMIT = 12  # and from a flow with less convection
 FIRST_SHARE, LEAST_SHARE = 0.25, 1.0 / 64.0  # steps of the share of convection
 
 
-def steady_flow(problem: FlowProblem, motion: StepMotion = REST, guess: FlowField | None = None) -> FlowField:
+def steady_flow(
+    problem: FlowProblem,
+    motion: StepMotion = REST,
+    guess: FlowField | None = None,
+    converged: float = CONVERGED,
+) -> FlowField:
     """Steady flow with convection under constant forcing; leaves it in `problem`.
 
     Newton's method from a `guess` with the same ports, or from the creeping flow, with the factored creeping operator as preconditioner, so
@@ -33,7 +38,7 @@ def steady_flow(problem: FlowProblem, motion: StepMotion = REST, guess: FlowFiel
     else:
         problem.start_from(guess, (1.0, motion.frame_velocity_y))
     try:
-        _newton(problem, motion, LIMIT)
+        _newton(problem, motion, LIMIT, converged=converged)
     except ConvergenceError:
         _grow(problem, motion)
     problem.weigh(motion)
@@ -47,11 +52,13 @@ def _creep(problem: FlowProblem, motion: StepMotion) -> None:
     problem.solve_steady(motion, force)
 
 
-def _newton(problem: FlowProblem, motion: StepMotion, limit: int, exact: bool = False) -> None:
+def _newton(
+    problem: FlowProblem, motion: StepMotion, limit: int, exact: bool = False, converged: float = CONVERGED
+) -> None:
     change = np.inf
     for _ in range(limit):
         last, change = change, problem.newton_update(motion, exact=exact)
-        if change < CONVERGED or (change < ROUNDING and change > 0.5 * last):
+        if change < converged or (change < ROUNDING and change > 0.5 * last):
             return
         if not np.isfinite(change):
             break
