@@ -86,9 +86,8 @@ def spreading(space: FlowSpace, source: Floats) -> Floats:
     along = np.concatenate([[0.0], np.cumsum(left)]) * (share / grid.dy)[:, None]  # velocities
     along[:, -1] = 0.0
     upwards = np.vstack([-leaving["bottom"], gained - left * share[:, None]]).cumsum(axis=0) / grid.dx
-    upwards[-1] = (
-        leaving["top"] / grid.dx
-    )  # nothing through inlets, not even rounding: it would be what a closed one feeds
+    # nothing through inlets, not even rounding: it would be what a closed one feeds
+    upwards[-1] = leaving["top"] / grid.dx
     row, column = strip.row, strip.column
     field = np.zeros(len(space.weights))
     field[space.dofs[:, BOTTOM]], field[space.dofs[:, TOP]] = upwards[row, column], upwards[row + 1, column]

@@ -65,9 +65,8 @@ class Thermal:
         self.heat = Heat(case, strip)
         self.flow: HeatedFlow = self._new_flow()
         self._operators: dict[FlowField, HeatOperator] = {}
-        self._steady_heat = np.zeros(
-            strip.owned
-        )  # of reactions when they were last in a steady state, in own cells [W/m]
+        # of reactions and species when they were last in a steady state, in own cells [W/m]
+        self._steady_heat = np.zeros(strip.owned)
         gas = case.gas.temperature
         reactions, mechanism = transport.reactions, case.mechanism
         self._surface_heat = [-mechanism.heat_of_reaction(r, gas) for r in reactions.surface.reactions]
