@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mpm.advice.idle import idle_keys
 from mpm.constants import GAS_CONSTANT
 from mpm.errors import InputError
 from mpm.physics.mechanism import Species
@@ -92,6 +93,18 @@ def test_dilute_species_hardly_change_a_mixture() -> None:
         one, other = fields[0].field(name), fields[1].field(name)
         np.testing.assert_allclose(other, one, rtol=0.0, atol=3e-3 * np.abs(one).max())
     assert np.abs(fields[1].field("density") / fields[0].field("density") - 1.0).max() > 1e-5
+
+
+def test_viscosity_of_a_species_counts_in_a_mixture_alone() -> None:
+    """Fails when a key that nothing reads is not called idle."""
+    key = "chemistry.species.TMA.viscosity"
+    for changes, idle in (
+        ({}, True),
+        ({"energy.soret": False}, True),
+        ({"energy.soret": False, "gas.mixture": True}, False),
+    ):
+        told = " ".join(idle_keys(zone({key: "1e-5 Pa s", **changes}, TINY)))
+        assert (key in told) == idle, told
 
 
 def test_mixture_needs_energy() -> None:

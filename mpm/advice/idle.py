@@ -121,8 +121,13 @@ def _of_energy(case: Case) -> Idle:
         for table in ("species", "site", "film", "reaction"):
             for name in case.typed(f"chemistry.{table}"):
                 typed = case.typed(f"chemistry.{table}.{name}")
-                yield from ((f"chemistry.{table}.{name}.{key}", _ISOTHERMAL) for key in HEATS if key in typed)
+                keys = (*HEATS, *(("viscosity",) if table == "species" else ()))
+                yield from ((f"chemistry.{table}.{name}.{key}", _ISOTHERMAL) for key in keys if key in typed)
         return
+    if not case.gas.mixture:
+        for name in case.typed("chemistry.species"):
+            if "viscosity" in case.typed(f"chemistry.species.{name}"):
+                yield f"chemistry.species.{name}.viscosity", "the gas is no mixture (gas.mixture)"
     if case.fidelity == "steady":
         yield from _typed(
             case.energy, "energy", ["flow_update"], "a steady flow is that of its own temperatures"
