@@ -7,11 +7,12 @@ import pytest
 
 from mpm.case.case import Case
 from mpm.errors import ConvergenceError
+from mpm.physics.gases import CARRIERS
 from mpm.reactor.reactor import Reactor
 from mpm.report.balances import balance_errors, element_balances
 from mpm.transport.diffusant import Diffusant
 
-from .cases import MPI, TINY, heat_of, run, strip_case, wall, zone
+from .cases import MPI, TINY, heat_of, physical_numbers, run, strip_case, wall, zone
 
 STILL = {"gamma": 0.0, "bed_velocity": "0 m/s", "start": "0 s"}
 GAS = {"name": "gas", "height": "3 mm", "cells": 4}
@@ -195,3 +196,62 @@ def test_heat_closes_where_hot_solids_hardly_change() -> None:
     )
     _, result = run(case)
     assert result.summary["energy"]["balance_error"] < 1e-9
+
+
+@pytest.mark.parametrize("fidelity", ["averaged", "resolved"])
+def test_a_closed_strip_that_is_heated_evenly(fidelity: str) -> None:
+    """Fails when gas whose density stays the same keeps the pressure, viscosity and rates of before: p rises by T/T0, nothing moves."""
+    case = gas_case({}, {**GAS, "heating": "5e4 W/m^3"}, fidelity=fidelity)
+    reactor, result = run(case)
+    warmer = result.field("temperature") / 473.0
+    assert warmer.min() > 1.2
+    gas = reactor.system.gas
+    assert gas is not None and gas.pressure == pytest.approx(warmer.mean(), rel=5e-3)
+    np.testing.assert_allclose(gas.temperature, warmer.mean() * 473.0, rtol=5e-3)
+    assert np.abs(reactor.field("velocity")).max() < 1e-12
+
+
+def test_much_that_diffuses_through_an_inlet_is_not_gas() -> None:
+    """Fails when the gas is counted as a small difference of what conducts heat both ways through the face of an inlet."""
+    inlet = {"name": "in", "center": "1.5 mm", "width": "1 mm", "velocity": "1 cm/s", "temperature": "600 K"}
+    case = gas_case(
+        {**OPEN, "inlet": [inlet], "inlet_diffusion": True},
+        gas={"pressure": "100 Pa"},
+        time={"end": "0.1 s", "step": "5 ms"},
+    )
+    reactor, _ = run(case)
+    assert balance_errors(reactor.case, reactor.totals())["gas"] < 1e-14
+
+
+@pytest.mark.parametrize("fidelity", ["averaged", "steady"])
+def test_the_temperature_of_the_gas_is_a_mere_reference(fidelity: str) -> None:
+    """Fails when a number depends on gas.temperature where all temperatures and properties are given: doses, fronts, rates, velocities."""
+    results = []
+    for reference in (473.0, 350.0):
+        changes = {
+            **WARM,
+            "fidelity": fidelity,
+            "energy": {"initial_temperature": "420 K", "flow_update": 1e-9, "soret": True},
+            "gas.temperature": f"{reference} K",
+            "gas.viscosity": f"{CARRIERS['N2'].viscosity(reference)!r} Pa s",
+            "gas.heat_capacity": "1050 J/kg/K",
+            "gas.diffusivity": f"{2.88e-5 * (reference / 473.0) ** 1.75!r} m^2/s",
+            "geometry.inlet.tma.temperature": "400 K",
+            "geometry.inlet.purge.temperature": "500 K",
+            "time.end": "0.2 s",
+            **{
+                f"chemistry.reaction.{key}.heat_of_reaction": "-200 kJ/mol" for key in ("tma", "water", "cvd")
+            },
+        }
+        results.append(run(zone(changes, TINY))[1])
+    one, other = (physical_numbers(result.summary) for result in results)
+    of_the_reference = (
+        "energy.",
+        "flow.",
+    )  # heat is counted from there, flows are told at that density, weight is that of a difference
+    for name, value in one.items():
+        if not name.startswith(of_the_reference):
+            assert other[name] == pytest.approx(value, rel=1e-4, abs=1e-9), name
+    for name in ("temperature", "velocity", "C_TMA"):
+        a, b = (result.field(name) for result in results)
+        np.testing.assert_allclose(b, a, rtol=1e-5, atol=1e-5 * np.abs(a).max(), err_msg=name)

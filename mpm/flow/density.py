@@ -52,6 +52,7 @@ class Density:
         most = max(
             np.abs(new.relative[own] / old.relative[own] - 1.0).max(initial=0.0),
             np.abs(new.mass[own] / old.mass[own] - 1.0).max(initial=0.0),
+            np.abs(new.temperature[own] / old.temperature[own] - 1.0).max(initial=0.0),  # at constant volume
         )
         self.changed = bool(largest(self.strip.comm, [most])[0] > self._same)
         self.source = np.zeros(self.strip.owned)

@@ -89,6 +89,7 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
     """Per dosing inlet and layer: the fronts of its precursor's height-averaged concentration (see `front`).
 
     In layers with reactive surface also `coverage` [m], see `coverage_front`, of the site species that its half-reactions make.
+    With heat, concentrations are those that the same mole fractions have at the temperature of `[gas]`.
     `height`: the y [m] at which the precursor in the column of the centreline, seen from the inlet, falls to half its feed.
     """
     result: dict[str, dict[str, Any]] = {}
@@ -97,6 +98,8 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
         if species is None or species not in state.concentration:
             continue
         field = state.concentration[species]
+        if state.temperature is not None:  # hot gas holds less, but that is no front
+            field = field * (state.temperature / case.gas.temperature)
         feed = case.feed_concentrations(inlet.mass_fractions)[species]
         made = titrated(case, species, state.theta)
         entry: dict[str, Any] = {}

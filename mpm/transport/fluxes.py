@@ -94,17 +94,22 @@ def face_conductance(strip: Strip, diffusivity: Floats) -> Floats:
 class PortFlux:
     """One port's exchange with its cells: species leave at `out` C_cell and enter at `into` C_port [m2/s each].
 
-    `area` (n,) is the open length of each cell's facet [m], `volume_out` the gas flow out through it [m2/s]; `weights` (n,) times the
-    concentrations of the cells, summed up and over the sum of `area`, is the mean of what is next to the port. Volumes are those at the
-    state of `[gas]`, and so is C_port.
+    `area` (n,) is the open length of each cell's facet [m], `volume_in` the gas flow in through it [m2/s], below 0 where it flows out;
+    `weights` (n,) times the concentrations of the cells, summed up and over the sum of `area`, is the mean of what is next to the port.
+    Volumes are those at the state of `[gas]`, and so is C_port.
     """
 
     cells: Ints
     out: Floats
     into: Floats
     area: Floats
-    volume_out: Floats
+    volume_in: Floats
     weights: Floats
+
+    @property
+    def volume_out(self) -> Floats:
+        """Gas flow out through each facet [m2/s]."""
+        return np.maximum(-self.volume_in, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +196,7 @@ class FluxAssembler:
         into, out = exponential_flux(volume_in / area, conductance)
         leaving = self._per_concentration(out * area, cells)
         weights = self._per_concentration(area, cells)
-        return PortFlux(cells, leaving, into * area, area, np.maximum(-volume_in, 0.0), weights)
+        return PortFlux(cells, leaving, into * area, area, volume_in, weights)
 
     def _outlet(self, outlet: Outlet, flow: FaceFlow) -> PortFlux:
         """Convection alone: gas leaves with what its cell holds."""
@@ -202,7 +207,7 @@ class FluxAssembler:
         area = np.full(len(mine), strip.grid.dx)
         out, cells = np.maximum(-volume_in, 0.0), cells[mine]
         leaving, weights = self._per_concentration(out, cells), self._per_concentration(area, cells)
-        return PortFlux(cells, leaving, np.maximum(volume_in, 0.0), area, out, weights)
+        return PortFlux(cells, leaving, np.maximum(volume_in, 0.0), area, volume_in, weights)
 
     def _per_concentration(self, coefficients: Floats, cells: Ints) -> Floats:
         """Coefficients of the concentrations of `cells`, from those of what is carried."""

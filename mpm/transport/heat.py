@@ -169,7 +169,7 @@ class Heat:
             for wall, conductance in zip(self.fluxes.walls, operator.walls, strict=True)
         ]
         ports = [*fluxes.inlets.values(), *fluxes.outlets.values()]
-        gas = sum(float(port.into.sum() - port.out.sum()) for port in ports)
+        gas = sum(float(port.volume_in.sum()) for port in ports)  # not into - out: much may diffuse both ways
         parts = (
             total(self.strip.comm, [gas, *inlets, *outlets, *walls, self.fluxes.heating.sum() / self.unit])
             * dt
