@@ -1,0 +1,1 @@
+"""The sections of docs/temperature.md, each of which measures its table: see `scripts/temperature.py`."""
