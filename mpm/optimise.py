@@ -88,6 +88,8 @@ class Search:
         case = self.case_at(doses)
         velocities = tuple(inlet.velocity for inlet in case.geometry.inlets)
         known = self._flow[1] if self._flow is not None and self._flow[0] == velocities else None
+        if case.energy is not None:
+            known = None  # it follows the temperatures that its own doses make
         reactor = Reactor(case, flow=known)
         try:
             summary = reactor.run().summary

@@ -1,12 +1,16 @@
-"""Faults of heated runs that random cases found."""
+"""Random heated strips, and the faults of heated runs that they found. `python scripts/heated.py` runs hundreds."""
 
+import sys
+from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mpm.case.case import Case
-from mpm.errors import ConvergenceError
+from mpm.errors import ConvergenceError, InputError
+from mpm.optimise import optimise
 from mpm.physics.gases import CARRIERS
 from mpm.reactor.reactor import Reactor
 from mpm.report.balances import balance_errors, element_balances
@@ -14,6 +18,11 @@ from mpm.transport.diffusant import Diffusant
 
 from .cases import MPI, TINY, heat_of, physical_numbers, run, strip_case, wall, zone
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+
+import heated
+
+STRIPS = 14
 STILL = {"gamma": 0.0, "bed_velocity": "0 m/s", "start": "0 s"}
 GAS = {"name": "gas", "height": "3 mm", "cells": 4}
 OPEN = {"outlet": [{"name": "out", "center": "1.5 mm", "width": "1 mm"}]}
@@ -255,3 +264,26 @@ def test_the_temperature_of_the_gas_is_a_mere_reference(fidelity: str) -> None:
     for name in ("temperature", "velocity", "C_TMA"):
         a, b = (result.field(name) for result in results)
         np.testing.assert_allclose(b, a, rtol=1e-5, atol=1e-5 * np.abs(a).max(), err_msg=name)
+
+
+def test_random_strips() -> None:
+    """Fails when a strip of any kind ends with balances that do not close, temperatures that nothing makes, or anything but one line."""
+    said = {seed: heated.verdict(seed) for seed in range(STRIPS)}
+    assert {seed: words for seed, words in said.items() if words[0] == "failed"} == {}
+    assert Counter(end for end, _ in said.values())["done"] > 0.8 * STRIPS
+
+
+def test_what_passes_from_wall_to_wall_is_the_measure_of_heat() -> None:
+    """Fails when thin gas between two walls, which holds next to nothing, is out of balance by rounding of nothing in all."""
+    walls = [wall("bottom", temperature="300 K"), wall("top", heat_flux="1 kW/m^2", end="1 mm")]
+    _, result = run(gas_case({**OPEN, "wall": walls}, fidelity="steady", gas={"pressure": "100 Pa"}))
+    assert result.summary["energy"]["balance_error"] < 1e-9
+
+
+def test_a_flow_is_not_handed_to_a_heated_case() -> None:
+    """Fails when a heated run takes over a flow at other temperatures; `mpm optimise` must then find one at every step."""
+    cool, warm = zone(mesh=TINY), zone(WARM, TINY)
+    with pytest.raises(InputError, match=r"a case with \[energy\]"):
+        Reactor(warm, MPI.COMM_SELF, flow=Reactor(cool, MPI.COMM_SELF).flow)
+    _, _, search = optimise(warm, target=0.5, limit=4)
+    assert len(search.points) > 1

@@ -68,7 +68,11 @@ def taken_over(flow: Flow, case: Case, strip: Strip, schedule: Schedule) -> Flow
 
     Collective.
     """
-    if case.energy is not None or not isinstance(flow.sequence, CyclicFlow):
+    if case.energy is not None:
+        raise InputError(
+            "flow: found that of another run for a case with [energy], whose flow follows its own temperatures; accepted: none"
+        )
+    if not isinstance(flow.sequence, CyclicFlow):
         raise InputError(
             "flow: found a transient, which belongs to one run; accepted: the flow of a developed run without heat"
         )

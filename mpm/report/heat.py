@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 HEAT_TERMS = ("inlets", "outlets", "walls", "solids", "reaction", "heating", "stored")
 """Of the balance of heat: all before the last, into the strip positive, add up to the last."""
 TRIFLE = 1e-6  # K: heat that changes all temperatures by no more is none
+HELD = 1e-7  # of the heat in the strip: what passes must be known to 1e-9 of that, and floats to 1e-16 of it
 RISEN = 0.95  # of the way from the temperature at which solids enter to that at which they leave
 HARDLY = 1.0  # K, a way that is none
 
@@ -113,13 +114,16 @@ def energy(case: Case, heat: HeatTotals | None) -> dict[str, float]:
 def heat_balance(case: Case, heat: HeatTotals) -> float:
     """inlets + outlets + walls + solids + reaction + heating - stored over the largest of them.
 
-    Or over what warms the strip by 1 uK (steady: per second) where all are smaller, so that a strip at one temperature has no error but
-    rounding of 0.
+    What passes a single port or wall counts, too: what comes in by one wall and leaves by another is much, and nothing in all. Or over what
+    warms the strip by 1 uK (steady: per second), or 1e-7 of what it holds, where all are smaller, so that a strip at one temperature has no
+    error but rounding of 0.
     """
     terms = heat_terms(heat)
     stored = terms.pop("stored")
     residual = sum(terms.values()) - stored
-    scale = max(*(abs(v) for v in terms.values()), abs(stored), TRIFLE * heat_capacity(case))
+    single = [*heat.inlets, *heat.outlets, *heat.walls]
+    held = HELD * max(abs(heat.stored), abs(heat.stored_initially))
+    scale = max(*(abs(v) for v in [*terms.values(), *single, stored]), held, TRIFLE * heat_capacity(case))
     return float(abs(residual) / scale)
 
 
