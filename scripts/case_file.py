@@ -59,6 +59,11 @@ conductivity_model = "zehner_bauer_schluender"
   `heat_of_reaction`. Some enthalpies of a reaction without the others are refused; where there is none its heat is 0, and `mpm check`
   says so.
 * Typed properties of the gas hold at `gas.temperature`, from where they follow the carrier's own laws; diffusivities follow T^1.75.
+* `gas.mixture = true`: density, viscosity and diffusivities are those of the mixture, for feeds that are not dilute.
+  `species.NAME.viscosity` is that of a species alone; without it the species counts as carrier there. The number of moles that reactions
+  make does not move the gas.
+* Where solids come in fresh, the seam of a periodic strip conducts no heat between solids: powder that leaves does not touch what enters.
+  Dispersion by vibration (`transport.vibrational_dispersion`) is that of species, not of heat.
 * `material.NAME.pore_diameter`, with temperature or without: gas that is thin enough slips at the walls of the pores, K (1 + 8 l/d), and
   meets them as often as other molecules, 1/D = 1/D_m + 1/D_K. In wide pores nothing changes.
 """

@@ -34,7 +34,7 @@ class Energy(Frozen):
     conductivity_model: ConductivityModel = "parallel"
     """how gas and solid conduct side by side: parallel (most; the thesis), series (least), geometric, zehner_bauer_schluender (beads)"""
     flow_update: FlowUpdate = 0.01
-    """relative change of temperature, anywhere, after which the flow is solved for anew"""
+    """relative change of temperature, mean over a layer, after which the flow is solved for anew"""
     buoyancy: Flag = True
     """whether weight and the reactor's acceleration act on differences of the gas's density"""
     soret: Flag = False
