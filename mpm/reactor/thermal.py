@@ -45,6 +45,7 @@ LITTLE, UNKNOWN = (
 )  # K: temperatures that are given and lie closer than the first say nothing of the spread there will be
 # of the spread of temperatures: steps that change more are taken back; below the others pseudo-time lengthens, or is no longer needed
 FAR, STEEP, CLOSE = 2.0, 0.2, 0.02
+STALLED = 0.7  # of the change of the step before
 LONGER, SHORTER = 4.0, 0.25
 
 
@@ -106,7 +107,7 @@ class Thermal:
         heat, newton, change = self.heat, Overturning(self.heat, self.strip), np.inf
         given = self.case.temperatures[-1] - self.case.temperatures[0]
         spread = given if given > LITTLE else UNKNOWN
-        motion, bed, time = mean_motion(self.motion), self.case.conveying_velocity, FIRST
+        motion, bed, time, last = mean_motion(self.motion), self.case.conveying_velocity, FIRST, np.inf
         for _ in range(STEPS):
             problem, operator = flow.problem, self._steady_operator()
             drawn = heat.fluxes.outlet_means(operator, heat.excess)
@@ -122,12 +123,31 @@ class Thermal:
             flow.adopt(problem.field(), motion)
             if change < SETTLED:
                 return
+            if time == NEVER and change > STALLED * last:
+                self._draw_in(flow, spread)
+            last = change
             time = NEVER if change < CLOSE * spread else time * (LONGER if change < STEEP * spread else 1.0)
         require_plausible(self.case, self.strip, heat.temperature + warmer)
         raise ConvergenceError(
             f"steady state: temperatures still change by {change:.3g} K after {STEPS} steps of flow and heat; the gas may have no steady "
             "flow where it is heated from below, or nothing may take away what heats it: try fidelity averaged"
         )
+
+    def _draw_in(self, flow: HeatedCycle, spread: float) -> None:
+        """Take the temperatures that are steady in the present flow, unless that is more than a `spread` of them [K]; collective.
+
+        What an outlet draws back in is what has just left it, and lags behind by a Newton step: gas that turns over there would cool by a
+        kelvin in each.
+        """
+        before, operator = self.heat.excess, self._steady_operator()
+        if operator.fluxes.drawn_in:
+            try:
+                change = self.heat.settle(operator, self.case.conveying_velocity, self._steady_heat)
+            except ConvergenceError:
+                change = np.inf
+            if not change < spread:
+                self.heat.excess = before
+            flow.density.take(self.heat.temperature, self._fractions())
 
     def settle(self) -> float:
         """Take the temperatures that are steady in the present flow, with what reactions have given off in the second that is booked.
