@@ -9,7 +9,7 @@ from heat_sections.store import COARSE, HOT, Numbers, case_of, kept, markdown
 from mpm import Case, Reactor
 
 PAIRS = 2
-SECONDS = {"averaged": 5.0, "resolved": 1.0, "steady": 0.0}
+SECONDS = {"averaged": 4.0, "resolved": 0.25, "steady": 0.0}
 ENERGIES: dict[str, dict[str, Any] | None] = {
     "none": None,
     "`[energy]`, nothing changes": {},

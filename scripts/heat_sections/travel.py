@@ -39,6 +39,7 @@ MODE = math.pi**2 / 4.0
 MEAN_AT = math.log(8.0 / math.pi**2 * (HOT - COLD) / WITHIN) / MODE
 """alpha t/h2 at which the mean of a slab on a plate is within 5 K, insulated above: first term of the series (Carslaw and Jaeger 1959)."""
 SHARES = np.linspace(0.0, 1.0, 60) ** 2
+SLOW = (0.1, 0.03, 0.01)  # cm/s
 HEATED = 3.6e7  # W/m3 of the frit
 
 
@@ -137,6 +138,12 @@ def heated_frit(model: str, mesh: str) -> Numbers:
     return run(f"frit-{model}-{mesh}", case_of("heating", mesh, STEADY, changes))
 
 
+def slow(speed: float, mesh: str) -> Numbers:
+    """The zone as it is with a slow bed, `speed` in cm/s."""
+    case = case_of("heating", mesh, STEADY, {"motion.bed_velocity": f"{speed} cm/s"})
+    return run(f"slow-{speed:g}-{mesh}", case)
+
+
 # --- tables ---
 
 
@@ -169,7 +176,20 @@ def table(meshes: tuple[str, ...]) -> str:
         "plate, coldest row, cm",
     ]
     head += ["as it is: gain in a zone, K", "as it is: zone after zone, m", "as it is, without ports, m"]
-    return f"{measured_on(meshes)}\n\n{markdown(head, lines)}\n\n{heated_table(meshes)}"
+    return (
+        f"{measured_on(meshes)}\n\n{markdown(head, lines)}\n\n{slow_table(meshes)}\n\n{heated_table(meshes)}"
+    )
+
+
+def slow_table(meshes: tuple[str, ...]) -> str:
+    """At what temperature a slow bed leaves the zone as it is."""
+    lines = []
+    for speed in SLOW:
+        found = [slow(speed, mesh)["temperature.bed_exit"] for mesh in meshes]
+        lines.append([f"{speed:g}", f"{13.97 / speed / 60:.0f}", both([HOT - t for t in found], ".1f")])
+    return markdown(
+        ["as it is, bed, cm/s", "minutes in the zone", "powder leaves colder than the walls by, K"], lines
+    )
 
 
 def heated_table(meshes: tuple[str, ...]) -> str:
