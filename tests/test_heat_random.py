@@ -74,21 +74,15 @@ def test_traces_balance(fidelity: str) -> None:
     assert max(balance_errors(reactor.case, reactor.totals()).values()) < 1e-10
 
 
-def test_a_closed_inlet_feeds_nothing() -> None:
+@pytest.mark.parametrize("fidelity", ["averaged", "resolved"])
+def test_a_closed_inlet_feeds_nothing(fidelity: str) -> None:
     """Fails when the gas that heating drives out leaves by rounding through an inlet, which then feeds as much precursor."""
-    inlet = {
-        "name": "in",
-        "center": "1.5 mm",
-        "width": "1 mm",
-        "velocity": "0 m/s",
-        "mass_fractions": {"TMA": 1e-4},
-    }
-    walls = [wall("top", temperature="600 K", end="1 mm"), wall("bottom", temperature="300 K", end="1 mm")]
-    for fidelity in ("averaged", "resolved"):
-        case = gas_case({**OPEN, "inlet": [inlet], "wall": walls}, fidelity=fidelity, time={"end": "0.3 s"})
-        reactor, _ = run(case)
-        assert heat_of(reactor).gas_passed != 0.0
-        assert not reactor.totals().fed.any()
+    changes = {f"geometry.inlet.{name}.velocity": "0 m/s" for name in ("tma", "purge")}
+    changes["geometry.inlet.tma.side"] = "top"  # to there divergences add up
+    changes["geometry.inlet.tma.center"] = "120 mm"
+    reactor, _ = run(zone({**WARM, **changes, "fidelity": fidelity, "time.end": "0.3 s"}, TINY))
+    assert heat_of(reactor).gas_passed != 0.0
+    assert not reactor.totals().fed.any()
 
 
 def test_drift_in_narrow_pores() -> None:
@@ -181,30 +175,18 @@ def test_gas_that_a_flux_cools_stays_at_rest(fidelity: str) -> None:
 
 def test_sudden_heat_drives_gas_out_of_an_impulsive_run() -> None:
     """Fails when the gas that expands all at once is taken for a flow that diverges."""
-    walls = [wall("bottom", temperature="900 K"), wall("top", temperature="900 K", end="1 mm")]
-    case = gas_case(
-        {**OPEN, "wall": walls},
+    walls = [wall("bottom", temperature="600 K", end="4 mm"), wall("top", temperature="600 K", end="4 mm")]
+    case = strip_case(
+        [{"name": "gas", "height": "1 mm", "cells": 8}],
+        columns=40,
+        length=40e-3,
+        geometry={"wall": walls, "outlet": [{"name": "out", "center": "39.5 mm", "width": "1 mm"}]},
         fidelity="resolved",
         energy={"initial_temperature": "300 K", "buoyancy": False},
         motion={**STILL, "startup": "impulsive"},
-        time={"end": "0.05 s"},
+        time={"end": "0.01 s", "steps_per_cycle": 64},
     )
     run(case)
-
-
-def test_heat_closes_where_hot_solids_hardly_change() -> None:
-    """Fails when what a step leaves is measured by all the heat that solids hold, not by what changes."""
-    layer = {"name": "bed", "height": "20 mm", "cells": 4, "material": "glass_beads"}
-    case = gas_case(
-        {"wall": [wall("bottom", heat_flux="1 kW/m^2")]},
-        layer,
-        fidelity="resolved",
-        gas={"temperature": "900 K"},
-        energy={"initial_temperature": "300 K"},
-        time={"end": "0.5 s"},
-    )
-    _, result = run(case)
-    assert result.summary["energy"]["balance_error"] < 1e-9
 
 
 @pytest.mark.parametrize("fidelity", ["averaged", "resolved"])
