@@ -53,6 +53,9 @@ if TYPE_CHECKING:
 
 STILL = 1e-10  # of the speed that ports, motion and buoyancy could give: gas that moves no faster is at rest, but for rounding
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
+STILL_HEATED = (
+    1e-9  # the same where weight, which is counted from the density of the case, leaves more rounding
+)
 PortState = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
 CLOSED_PORTS: PortState = (0.0, 0.0)
 
@@ -230,7 +233,10 @@ class FlowProblem:
             self._iterate(STEADY, tolerance)
         self._adopt()
         change = self.space.fastest(self._work.array)
-        fastest = max(self.space.fastest(self.values), STILL * driving_speed(self.case, self.gas))
+        fastest = max(
+            self.space.fastest(self.values),
+            (STILL if self.gas is None else STILL_HEATED) * driving_speed(self.case, self.gas),
+        )
         change, fastest = largest(self.strip.comm, [change, fastest])
         return float(change / fastest) if fastest > 0.0 else 0.0
 
