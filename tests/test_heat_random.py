@@ -279,7 +279,7 @@ def test_a_flow_is_not_handed_to_a_heated_case() -> None:
 
 def test_gas_far_from_its_reference_is_at_rest() -> None:
     """Fails when rounding of a weight that is everywhere the same is taken for a flow that is not found."""
-    closed = {f"geometry.{key}": [] for key in ("inlet", "outlet", "zone")}
+    closed: dict[str, Any] = {f"geometry.{key}": [] for key in ("inlet", "outlet", "zone")}
     changes = {
         **closed,
         "energy.initial_temperature": "300 K",
