@@ -100,7 +100,7 @@ ZONE = (
     ("titration.tma.exit_min", "coated at the exit, worst row", 1.0, ".4f"),
     ("utilisation.tma", "TMA used", 1.0, ".3f"),
     ("late.outlets.zone1.x.TMA", "TMA in the outlet, 1e-6", 1e6, ".1f"),
-    ("outlets.zone1.backflow", "drawn back in", 1.0, ".2f"),
+    ("late.outlets.zone1.backflow", "drawn back in", 1.0, ".2f"),
 )
 CYCLE = (
     ("rising.headspace", "fastest up or down, cm/s", 1e2, ".1f"),
