@@ -51,11 +51,9 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.flow.state import GasState
 
-STILL = 1e-10  # of the speed that ports, motion and buoyancy could give: gas that moves no faster is at rest, but for rounding
+# of the speed that ports, motion and buoyancy could give: slower gas is at rest, but for rounding, of which weight leaves more
+STILL, STILL_HEATED = 1e-10, 1e-9
 NEWTON_TOLERANCE = 1e-4  # of the inner iteration of a Newton update
-STILL_HEATED = (
-    1e-9  # the same where weight, which is counted from the density of the case, leaves more rounding
-)
 PortState = tuple[float, float]  # share of the inlets' velocities, vertical velocity of the frame [m/s]
 CLOSED_PORTS: PortState = (0.0, 0.0)
 
@@ -149,8 +147,7 @@ class FlowProblem:
         self._balance(STEADY, passes=2 + self.refined)
 
     def driven(self, source: Floats, weight: PETSc.Vec | None) -> Floats:
-        """The creeping flow, ports closed, of what heating drives out of own cells, `source` (own,) [m2/s], and of a `weight` (own
-        fluxes,); (local fluxes,), collective. The state is not changed."""
+        """Creeping flow (local fluxes,), ports closed, of what cells give off, `source` (own,) [m2/s], and of a `weight`; collective."""
         state, unbalanced = self.values.copy(), self.unbalanced.array.copy()
         found = self._creeping(spreading(self.space, source), weight, passes=1)
         self.values[:], self.unbalanced.array[:] = state, unbalanced
@@ -233,10 +230,8 @@ class FlowProblem:
             self._iterate(STEADY, tolerance)
         self._adopt()
         change = self.space.fastest(self._work.array)
-        fastest = max(
-            self.space.fastest(self.values),
-            (STILL if self.gas is None else STILL_HEATED) * driving_speed(self.case, self.gas),
-        )
+        still = STILL if self.gas is None else STILL_HEATED
+        fastest = max(self.space.fastest(self.values), still * driving_speed(self.case, self.gas))
         change, fastest = largest(self.strip.comm, [change, fastest])
         return float(change / fastest) if fastest > 0.0 else 0.0
 
