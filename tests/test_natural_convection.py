@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from mpm.case.case import Case
+from mpm.errors import ConvergenceError
+from mpm.flow.heated import HeatedCycle
 from mpm.reactor.reactor import Reactor
 
-from .cases import MPI, assert_heat_balances, heat_of, strip_case, wall
+from .cases import HEATED, MPI, TINY, assert_heat_balances, heat_of, run, strip_case, wall, zone
 
 MEAN, APART = 300.0, 3.0  # K
 FOAM = {  # hardly any solid, so that gas and layer have one diffusivity; no shear at its walls
@@ -155,3 +157,26 @@ def test_square_cavity_in_time() -> None:
     """Fails when the transient with inertia does not end in the flow of Ra 1e6, Nu 8.800 (de Vahl Davis 1983)."""
     coarse, fine = nusselt(1e6, 24, "resolved"), nusselt(1e6, 36, "resolved", 0.08)
     assert fine + 0.8 * (fine - coarse) == pytest.approx(8.800, rel=0.02)
+
+
+def test_flow_that_is_not_found_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when one temperature at which no steady flow is found ends a run, or when it is never asked for again, or for ever."""
+    case = zone({**HEATED, "time.end": "3 s", "output.every": "1 s"}, TINY)
+    found = HeatedCycle.find
+    asked: list[float] = []
+
+    def find(self: HeatedCycle, *args: Any, **options: Any) -> Any:
+        asked.append(self._wait)
+        if len(asked) in lost:
+            raise ConvergenceError("steady flow: not found")
+        return found(self, *args, **options)
+
+    monkeypatch.setattr(HeatedCycle, "find", find)
+    monkeypatch.setattr("mpm.flow.heated.LONGEST", 2)
+    lost = {3}
+    assert run(case)[1].summary["status"] == "done"
+    assert asked[2:5] == [1, 2, 1]
+    asked.clear()
+    lost = set(range(3, 1000))
+    with pytest.raises(ConvergenceError, match="not found"):
+        run(case)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mpm.arrays import Floats
+from mpm.errors import ConvergenceError
 from mpm.flow.density import Density, moved
 from mpm.flow.factors import STEADY
 from mpm.flow.fields import FlowField
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from mpm.mesh.strip import Strip
 
 WAY = 0.1  # change of what is driven out, over that and what inlets blow, after which its way is found anew
+LONGEST = 16  # times `energy.flow_update` that temperatures may move while no flow is found
 AGE = 10  # steps after which it is in any case, and with it what buoyancy gains
 
 
@@ -62,6 +64,7 @@ class HeatedCycle:
             AGE,
         )  # for which that was found, and so many steps ago
         self._fields: dict[FlowField, FlowField] = {}
+        self._wait = 1  # times `energy.flow_update`, after which the flow is found anew
         self._blown = sum(inlet.velocity * inlet.width for inlet in case.geometry.inlets)
 
     @property
@@ -81,7 +84,11 @@ class HeatedCycle:
         problem, guess = self._new_problem(self.gas), self.cycle
         if guess is not None and vibrates:
             guess = CyclicFlow(None, guess.phases)
-        self.cycle = CyclicFlow.found(problem, self.bed_motion, self.schedule, watch, guess)
+        try:
+            self.cycle = CyclicFlow.found(problem, self.bed_motion, self.schedule, watch, guess)
+        except ConvergenceError:
+            problem.destroy()
+            raise
         problem.release(kept=STEADY)
         self._take(problem)
         self._more, self._fields, self._age = None, {}, AGE
@@ -119,9 +126,23 @@ class HeatedCycle:
         self._driven = density.changed
         if not (density.changed or was_driven):
             return
-        if moved(self.strip, self.gas, self.found_in) > self._update:
-            self.find(vibrates=step.phase != RESTING)
+        if moved(self.strip, self.gas, self.found_in) > self._wait * self._update:
+            self._find_again(step)
         self._drive(density.source)
+
+    def _find_again(self, step: Step) -> None:
+        """Find the flow anew; where it is not found the one before goes on, until temperatures have moved twice as far, and so on.
+
+        Gas that turns over may have no steady flow at some temperatures, and one again a little later. Raises ConvergenceError beyond
+        LONGEST.
+        """
+        try:
+            self.find(vibrates=step.phase != RESTING)
+            self._wait = 1
+        except ConvergenceError:
+            self._wait *= 2
+            if self._wait > LONGEST:
+                raise
 
     def _drive(self, source: Floats) -> None:
         """Let the cells give off `source` (own,) [m2/s] beside the flow that was found; collective."""
@@ -172,6 +193,7 @@ class HeatedCycle:
             "driven": self._driven,
             "way": scatter.to_root(np.vstack([self._way[:, :own], self._source])),
             "age": self._age,
+            "wait": self._wait,
         }
 
     def restore(self, stored: dict[str, Any], steps: int) -> None:
@@ -182,6 +204,7 @@ class HeatedCycle:
         more = np.ascontiguousarray(stored["more"][:, self.strip.cell])
         self._more = more if stored["more"].any() else None
         self._driven, self._age = bool(stored["driven"]), int(stored["age"])
+        self._wait = int(stored["wait"])
         way = np.ascontiguousarray(stored["way"][:, self.strip.cell])
         self._way, self._source = way[:4], way[4, : self.strip.owned]
         self._problem, self._fields = None, {}
