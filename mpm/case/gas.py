@@ -161,8 +161,8 @@ class Gas(Frozen):
     def _write_what_is_read(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         table: dict[str, Any] = handler(self)
         for key in ("heat_capacity", "conductivity", "mixture"):
-            if not self._thermal and key not in self.model_fields_set:
-                table.pop(key, None)
+            if not self._thermal and (key == "mixture" or key not in self.model_fields_set):
+                table.pop(key, None)  # a mixture without [energy] is refused, so that it is none
         return table
 
     @model_validator(mode="after")
