@@ -432,3 +432,12 @@ def test_time_in_which_walls_warm_the_bed() -> None:
     passed = (geometry.length - 8e-3) / geometry.length / below
     passed += (geometry.length - 10e-3) / geometry.length / above
     assert report["bed"]["wall_time"] == pytest.approx(layers["bed"]["heat_capacity"] * 3e-3 / passed)
+
+
+def test_steady_heat_of_solids_that_come_back_through_walls_is_refused() -> None:
+    """Fails when the bed's heat would leave at one end of a closed strip and not come in at the other."""
+    changes = {"fidelity": "steady", "geometry.bed_inflow": "periodic", "geometry.periodic": False}
+    with pytest.raises(InputError, match=r"geometry\.bed_inflow: found periodic solids between walls"):
+        load_case("single_zone", {**changes, "energy": {}})
+    for way in ({"geometry.periodic": True}, {"fidelity": "averaged"}, {"geometry.bed_inflow": "fresh"}):
+        load_case("single_zone", {**changes, "energy": {}, **way})

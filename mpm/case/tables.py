@@ -74,6 +74,14 @@ class CaseTables(Frozen):
                 )
             return
         self.gas.complete_thermal()
+        geometry = self.geometry
+        if self.fidelity == "steady" and geometry.bed_inflow == "periodic" and not geometry.periodic:
+            raise reject(
+                "periodic solids between walls (geometry.periodic = false) in a steady case with [energy], where heat goes by cells",
+                'fresh, geometry.periodic = true, or fidelity "averaged" or "resolved"',
+                key="geometry.bed_inflow",
+                given="",
+            )
         self.energy.complete(self.gas.temperature)
         self.geometry.complete_temperatures(self.gas.temperature)
         check_layers(self.geometry.layers)

@@ -39,10 +39,8 @@ HeatedFlow = HeatedCycle | HeatedMarch
 STEPS = 100  # Newton's, on the way to the steady flow and temperature
 SETTLED = 1e-3  # K, largest change of a temperature in the last step; the next would be smaller by 10 or more
 FIRST, NEVER = 1.0, 1e12  # s, pseudo-time of the first step, and one that no longer counts
-LITTLE, UNKNOWN = (
-    1.0,
-    50.0,
-)  # K: temperatures that are given and lie closer than the first say nothing of the spread there will be
+# K: temperatures that are given and lie closer than the first say nothing of the spread there will be
+LITTLE, UNKNOWN = 1.0, 50.0
 # of the spread of temperatures: steps that change more are taken back; below the others pseudo-time lengthens, or is no longer needed
 FAR, STEEP, CLOSE = 2.0, 0.2, 0.02
 STALLED = 0.7  # of the change of the step before
