@@ -195,6 +195,7 @@ BOOKKEEPING = {
     "fidelity",
     "balance_error",
     "mass_error",
+    "gas_balance_error",
 }
 
 
