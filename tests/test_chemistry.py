@@ -78,21 +78,21 @@ def test_equations_of_the_thesis(case: Case) -> None:
 def test_rate_constants_of_the_thesis(case: Case) -> None:
     """A = 0.9 and 1.9 m/s and 1.0 m3/kmol/s at 473 K; the surface constants follow the thermal velocity."""
     tma, water = case.mechanism.surface_reactions
-    assert float(tma.rate_constant(473.0, 0.07209)) == pytest.approx(0.9, rel=1e-12)
-    assert float(water.rate_constant(473.0, 0.01802)) == pytest.approx(1.9, rel=1e-12)
+    assert float(tma.rate_constant(473.0)) == pytest.approx(0.9, rel=1e-12)
+    assert float(water.rate_constant(473.0)) == pytest.approx(1.9, rel=1e-12)
     assert float(case.mechanism.gas_reactions[0].rate_constant(473.0)) == 1e-3
     temperature = np.array([300.0, 473.0, 600.0])
-    assert tma.rate_constant(temperature, 0.07209) == pytest.approx(0.9 * np.sqrt(temperature / 473.0))
+    assert tma.rate_constant(temperature) == pytest.approx(0.9 * np.sqrt(temperature / 473.0))
 
 
 def test_sticking_gives_kinetic_theory(case: Case) -> None:
     """lambda sqrt(R T/(2 pi M)): 0.932 and 1.864 m/s for 0.01, the numbers that the thesis rounds to 0.9 and 1.9."""
     changed = case.with_({"chemistry.reaction.tma.sticking": 0.01, "chemistry.reaction.water.sticking": 0.01})
     tma, water = changed.mechanism.surface_reactions
-    assert float(tma.rate_constant(473.0, 0.07209)) == pytest.approx(0.932, abs=5e-4)
-    assert float(water.rate_constant(473.0, 0.01802)) == pytest.approx(1.864, abs=5e-4)
+    assert float(tma.rate_constant(473.0)) == pytest.approx(0.932, abs=5e-4)
+    assert float(water.rate_constant(473.0)) == pytest.approx(1.864, abs=5e-4)
     expected = 0.01 * math.sqrt(R * 300.0 / (2.0 * math.pi * 0.07209))
-    assert float(tma.rate_constant(300.0, 0.07209)) == pytest.approx(expected, rel=1e-14)
+    assert float(tma.rate_constant(300.0)) == pytest.approx(expected, rel=1e-14)
 
 
 def test_sticking_may_be_activated(case: Case) -> None:
@@ -111,7 +111,7 @@ def test_sticking_may_be_activated(case: Case) -> None:
         changed = case.with_({key + name: value for name, value in changes.items()})
         for one in (changed, load_case(changed.to_dict())):
             (tma,) = one.mechanism.half_reactions("TMA")
-            assert float(tma.rate_constant(473.0, 0.07209)) == pytest.approx(expected * plain, rel=1e-12)
+            assert float(tma.rate_constant(473.0)) == pytest.approx(expected * plain, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -132,10 +132,10 @@ def test_rates_that_cannot_be_are_refused(case: Case, changes: dict[str, Any], t
 def test_an_override_replaces_the_other_form_of_the_rate(case: Case) -> None:
     """A over a sticking coefficient and back; also on the resolved dump, which spells the rate out."""
     sticky = case.with_({"chemistry.reaction.tma.sticking": 0.1})
-    assert sticky.mechanism.surface_reactions[0].sticking == 0.1
+    assert sticky.mechanism.surface_reactions[0].sticking_coefficient(473.0) == 0.1
     back = load_case(sticky.to_dict(), {"chemistry.reaction.tma.A": "90 cm/s"})
-    assert back.mechanism.surface_reactions[0].sticking is None
-    assert float(back.mechanism.surface_reactions[0].rate_constant(473.0, 0.07209)) == 0.9
+    assert back.mechanism.surface_reactions[0].sticking_coefficient(473.0) is None
+    assert float(back.mechanism.surface_reactions[0].rate_constant(473.0)) == 0.9
     off = case.with_({"chemistry.reaction.cvd.A": "0 m^3/mol/s"})
     assert float(off.mechanism.gas_reactions[0].rate_constant(473.0)) == 0.0
 
@@ -234,9 +234,7 @@ def test_a_mechanism_of_ones_own(tmp_path: Path) -> None:
     assert set(case.gas.diffusivity) == {"TiCl4", "H2O", "HCl"}
     water = case.mechanism.surface_reactions[1]
     assert water.molecules_per_site == 2.0
-    assert float(water.rate_constant(500.0, 0.018)) == pytest.approx(
-        1.5 * math.exp(-20e3 / (R * 500.0)), rel=1e-12
-    )
+    assert float(water.rate_constant(500.0)) == pytest.approx(1.5 * math.exp(-20e3 / (R * 500.0)), rel=1e-12)
     (tmp_path / "titania.toml").unlink()
     assert load_case(case.to_dict()) == case
 

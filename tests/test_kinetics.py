@@ -9,8 +9,11 @@ import sympy as sp
 from mpm.case.case import load_case
 from mpm.physics.exponentials import dphi1, dphi2, phi1, phi2
 from mpm.physics.kinetics import GasKinetics, SurfaceKinetics
-from mpm.physics.mechanism import Mechanism, Site, Species, SurfaceReaction
+from mpm.physics.mechanism import Mechanism
+from mpm.physics.rates import Arrhenius, Law
+from mpm.physics.reaction import SurfaceReaction
 from mpm.physics.roles import Roles
+from mpm.physics.substances import Site, Species
 
 from .cases import CASES, rate
 
@@ -37,12 +40,7 @@ def ring() -> Mechanism:
         return SurfaceReaction(
             key=gas,
             equation=f"{start} + {gas} -> {stop}",
-            A=k,
-            b=0.0,
-            Ea=0.0,
-            reference_temperature=1.0,
-            gas=gas,
-            site=start,
+            forward=Law(constant=Arrhenius(k), gas_orders={gas: 1.0}, site_orders={start: 1.0}),
             nu_gas={gas: -events},
             nu_site={start: -events, stop: events},
         )

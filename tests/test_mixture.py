@@ -6,8 +6,8 @@ import pytest
 from mpm.advice.idle import idle_keys
 from mpm.constants import GAS_CONSTANT
 from mpm.errors import InputError
-from mpm.physics.mechanism import Species
 from mpm.physics.mixture import diffusivity_ratio, mass_ratio, viscosity_ratio
+from mpm.physics.substances import Species
 from mpm.reactor.reactor import Reactor
 
 from .cases import HEATED, MPI, TINY, assert_heat_balances, column_case, run, zone

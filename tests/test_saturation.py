@@ -4,8 +4,11 @@ import pytest
 
 from mpm.advice.checks import check_case
 from mpm.case.case import Case
-from mpm.physics.mechanism import Mechanism, Site, Species, SurfaceReaction
+from mpm.physics.mechanism import Mechanism
+from mpm.physics.rates import Arrhenius, Law
+from mpm.physics.reaction import SurfaceReaction
 from mpm.physics.saturation import coverage_met, molecules_per_site, saturate, slowest_turnover, uptake
+from mpm.physics.substances import Site, Species
 
 from .cases import COARSE, run, zone
 
@@ -20,12 +23,7 @@ def reaction(
     return SurfaceReaction(
         key=f"{gas}-{start}",
         equation="",
-        A=k,
-        b=0.0,
-        Ea=0.0,
-        reference_temperature=1.0,
-        gas=gas,
-        site=start,
+        forward=Law(constant=Arrhenius(k), gas_orders={gas: 1.0}, site_orders={start: 1.0}),
         nu_gas={gas: -molecules},
         nu_site=sites,
     )

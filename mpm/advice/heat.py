@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from mpm.case.energy import Energy
     from mpm.case.layers import Layer
     from mpm.case.materials import Material
-    from mpm.physics.mechanism import SurfaceReaction
+    from mpm.physics.reaction import SurfaceReaction
 
 SLOW_EXCHANGE = 0.1
 """Exchange between gas and solids over conduction through the layer from which two temperatures are not one."""

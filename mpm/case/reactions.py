@@ -18,7 +18,10 @@ from mpm.case.chemistry import (
 )
 from mpm.physics.elements import parse_formula
 from mpm.physics.equation import ARROW, parse_equation, write_equation
-from mpm.physics.mechanism import GasReaction, Mechanism, Site, Species, SurfaceReaction
+from mpm.physics.mechanism import Mechanism
+from mpm.physics.rates import Arrhenius, Law, Sticking
+from mpm.physics.reaction import GasReaction, SurfaceReaction
+from mpm.physics.substances import Site, Species
 from mpm.units import LARGEST, Dimension, parse, reject
 
 _NAME = re.compile(r"[^\s.]+")
@@ -118,7 +121,7 @@ def check_rates(mechanism: Mechanism, temperature: float) -> None:
     for reaction in mechanism.reactions:
         key = f"chemistry.reaction.{reaction.key}"
         if isinstance(reaction, SurfaceReaction):
-            constant = reaction.rate_constant(temperature, mechanism.get(reaction.gas).molar_mass)
+            constant = reaction.rate_constant(temperature)
             share = reaction.sticking_coefficient(temperature)
             if share is not None and not float(share) <= 1.0:
                 raise reject(
@@ -225,18 +228,25 @@ def _surface_reaction(
     return SurfaceReaction(
         key=key,
         equation=write_equation(left, right),
-        A=0.0 if table.A is None else _rate_constant(table.A, SURFACE_RATE),
-        b=table.b,
-        Ea=table.Ea,
-        reference_temperature=table.reference_temperature,
-        gas=gases[0],
-        site=states[0],
+        forward=Law(
+            constant=_surface_constant(table, species[gases[0]].molar_mass),
+            gas_orders={gases[0]: 1.0},
+            site_orders={states[0]: 1.0},
+        ),
         nu_gas={name: nu for name, nu in net.items() if name in species},
         nu_site={name: nu for name, nu in net.items() if name in sites},
         film={name: nu for name, nu in net.items() if name in films},
-        sticking=table.sticking,
         given_heat=table.heat_of_reaction,
     )
+
+
+def _surface_constant(table: ReactionTable, molar_mass: float) -> Arrhenius | Sticking:
+    """From A, or from a sticking coefficient of a gas of `molar_mass` [kg/mol]."""
+    if table.sticking is not None:
+        share = Arrhenius(table.sticking, table.b, table.Ea, table.reference_temperature)
+        return Sticking(share=share, molar_mass=molar_mass)
+    A = _rate_constant(table.A or "", SURFACE_RATE)
+    return Arrhenius(A, table.b, table.Ea, table.reference_temperature)
 
 
 def _gas_reaction(
@@ -250,15 +260,14 @@ def _gas_reaction(
         raise reject(repr(table.equation), "a gas reaction of two different species into gas species")
     if table.sticking is not None or table.A is None:
         raise reject("sticking" if table.sticking is not None else "no A", GAS_RATE.accepted, key="A")
-    first, second = left
+    A = _rate_constant(table.A, GAS_RATE)
     return GasReaction(
         key=key,
         equation=write_equation(left, right),
-        A=_rate_constant(table.A, GAS_RATE),
-        b=table.b,
-        Ea=table.Ea,
-        reference_temperature=table.reference_temperature,
+        forward=Law(
+            constant=Arrhenius(A, table.b, table.Ea, table.reference_temperature),
+            gas_orders=dict.fromkeys(left, 1.0),
+        ),
         nu_gas=_net(left, right),
-        reactants=(first, second),
         given_heat=table.heat_of_reaction,
     )

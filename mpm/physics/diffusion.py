@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from mpm.arrays import Floats
 from mpm.physics.elements import parse_formula
 from mpm.physics.gases import CARRIERS
-from mpm.physics.mechanism import Species
+from mpm.physics.substances import Species
 
 REFERENCE_DIFFUSIVITY = 2.88e-5
 """[m2/s], in REFERENCE_CARRIER at REFERENCE_TEMPERATURE [K] and REFERENCE_PRESSURE [Pa]."""

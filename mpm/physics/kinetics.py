@@ -55,7 +55,6 @@ class SurfaceKinetics:
         self.reactions = mechanism.running_surface(coupled)
         self.gas = [coupled.index(r.gas) for r in self.reactions]
         self.site = [names.index(r.site) for r in self.reactions]
-        self._molar_mass = {s.name: s.molar_mass for s in mechanism.species}
         self.heat_to(temperature)
         self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
             len(self.reactions), len(names)
@@ -64,9 +63,7 @@ class SurfaceKinetics:
     def heat_to(self, temperature: ArrayLike) -> None:
         """Take the rate constants at another temperature [K], scalar or per cell."""
         t = np.broadcast_to(np.asarray(temperature, dtype=float), self.sites.shape)
-        self.constant = [
-            np.asarray(r.rate_constant(t, self._molar_mass[r.gas])) * np.ones_like(t) for r in self.reactions
-        ]
+        self.constant = [r.rate_constant(t) * np.ones_like(t) for r in self.reactions]
 
     def part(self, chosen: NDArray[np.integer]) -> SurfaceKinetics:
         """The same reactions in some of the cells."""

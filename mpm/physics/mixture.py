@@ -12,7 +12,7 @@ import numpy as np
 
 from mpm.arrays import Floats
 from mpm.physics.diffusion import carrier_volume, diffusion_volume
-from mpm.physics.mechanism import Species
+from mpm.physics.substances import Species
 
 Fractions = Mapping[str, Floats]
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mpm.physics.mechanism import GasReaction, Mechanism, SurfaceReaction
+    from mpm.physics.mechanism import Mechanism
+    from mpm.physics.reaction import Reaction
 
 
 @dataclass(frozen=True)
@@ -23,14 +24,19 @@ class Roles:
 
     @classmethod
     def of(cls, mechanism: Mechanism, fed: Collection[str]) -> Roles:
-        """Species that can appear when `fed` enter: a reaction runs once all its gas reactants are present."""
+        """Species that can appear when `fed` enter.
+
+        A reaction runs once all gases of one of its ways are present; one without a gas, such as a desorption, always.
+        """
         present: set[str] = set()
-        running: list[SurfaceReaction | GasReaction] = []
+        running: list[Reaction] = []
         made = set(fed)
-        while not made <= present:
+        while True:
             present |= made
             running = [*mechanism.running_surface(present), *mechanism.running_gas(present)]
-            made = {name for reaction in running for name in reaction.nu_gas}
-        reacting = {name for reaction in running for name in reaction.reactants}
+            made = {name for reaction in running for name in (*reaction.nu_gas, *reaction.gases)}
+            if made <= present:
+                break
+        reacting = {name for reaction in running for name in reaction.gases}
         order = [name for name in mechanism.species_names if name in present]
         return cls(tuple(n for n in order if n in reacting), tuple(n for n in order if n not in reacting))

@@ -9,16 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from mpm.physics.mechanism import Mechanism, SurfaceReaction
+from mpm.physics.mechanism import Mechanism
+from mpm.physics.reaction import SurfaceReaction
 
 
 def site_speeds(
     mechanism: Mechanism, species: str, site: str, temperature: float
 ) -> list[tuple[SurfaceReaction, float]]:
     """The reactions of `species` on `site`, each with k_r |nu_kr| [m/s]: times C/n_s, how fast it turns that site over."""
-    molar_mass = mechanism.get(species).molar_mass
     return [
-        (r, float(r.rate_constant(temperature, molar_mass)) * -r.nu_site[site])
+        (r, float(r.rate_constant(temperature)) * -r.nu_site[site])
         for r in mechanism.half_reactions(species)
         if r.site == site
     ]
@@ -87,11 +87,8 @@ def molecules_per_site(
 
 def uptake(mechanism: Mechanism, species: str, coverage: Mapping[str, float], temperature: float) -> float:
     """Speed [m/s] at which the surface takes `species` out of the gas, sum_r k_r |nu_ir| theta_r: flux over concentration."""
-    molar_mass = mechanism.get(species).molar_mass
     return sum(
-        float(r.rate_constant(temperature, molar_mass))
-        * -r.nu_gas.get(species, 0.0)
-        * coverage.get(r.site, 0.0)
+        float(r.rate_constant(temperature)) * -r.nu_gas.get(species, 0.0) * coverage.get(r.site, 0.0)
         for r in mechanism.half_reactions(species)
     )
 

@@ -17,7 +17,7 @@ from mpm.arrays import Floats
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.mesh.grid import Grid
-    from mpm.physics.mechanism import GasReaction, SurfaceReaction
+    from mpm.physics.reaction import GasReaction, SurfaceReaction
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mpm.case.case import Case
-    from mpm.physics.mechanism import GasReaction, SurfaceReaction
+    from mpm.physics.reaction import GasReaction, SurfaceReaction
 
 EXACT = 1e-9  # of the stoichiometric coefficients: sums that agree to this are equal
 
