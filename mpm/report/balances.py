@@ -73,14 +73,17 @@ def _stoichiometry(case: Case, names: tuple[str, ...], species: str) -> list[tup
 
 
 def site_balance(case: Case, totals: Totals) -> float:
-    """Largest error over the site species of: initial + made by reactions - left the strip = final, relative to all sites involved."""
-    names = case.mechanism.site_names
+    """Largest error over the site species of: initial + made by reactions - left the strip = final, relative to all sites involved.
+
+    Counted in places on the surface, of which a site species may hold several. Events are net where a reaction is reversible.
+    """
+    names, places = case.mechanism.site_names, case.mechanism.places
     residual = totals.sites - totals.sites_initially + totals.sites_passed
     turned = 0.0
     for index, reaction in enumerate(running_surface(case, totals.names)):
         events = float(totals.surface[index].sum())
-        residual = residual - events * np.array([reaction.nu_site.get(k, 0.0) for k in names])
-        turned += events
+        residual = residual - events * places * np.array([reaction.nu_site.get(k, 0.0) for k in names])
+        turned += abs(events)
     scale = max(float(totals.sites_initially.sum()), turned)
     return float(np.abs(residual).max(initial=0.0) / scale) if scale else 0.0
 
@@ -112,7 +115,7 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
                 -atoms * float(totals.stored[i] - totals.stored_initially[i]),
             ]
         for k, site in enumerate(mechanism.sites):
-            atoms = site.elements.get(element, 0.0)
+            atoms = site.elements.get(element, 0.0) / site.places  # per place, which is what is counted
             terms += [
                 -atoms * float(totals.sites_passed[k]),
                 -atoms * float(totals.sites[k] - totals.sites_initially[k]),
@@ -120,7 +123,7 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
         atoms_of_film = {film.name: film.elements.get(element, 0.0) for film in mechanism.films}
         terms += [-atoms_of_film[name] * amount for name, amount in film_made(case, totals).items()]
         on_solids = sum(
-            s.elements.get(element, 0.0) * n
+            s.elements.get(element, 0.0) / s.places * n
             for s, n in zip(mechanism.sites, totals.sites_initially, strict=True)
         )
         if not totals.fed.any():
@@ -131,7 +134,7 @@ def element_balances(case: Case, totals: Totals) -> dict[str, float]:
 
 
 def film_made(case: Case, totals: Totals) -> dict[str, float]:
-    """Formula units of each solid product on the particles and the frit [mol/m]."""
+    """Formula units of each solid product on the particles and the frit [mol/m]; below 0 of one that reactions have used up."""
     made = {film.name: 0.0 for film in case.mechanism.films}
     for index, reaction in enumerate(running_surface(case, totals.names)):
         for name, count in reaction.film.items():

@@ -49,8 +49,8 @@ class Totals:
     `fed` (inlets, species), `out`, `back` (outlets, species), `out_volume`, `back_volume` (outlets,), `stored`, `stored_initially`
     (species,) in the gas; `surface` (reactions, reactive rows, columns) and `gas` (reactions, zones + 1) events, the last by zone number
     (0: none); `reactive_rows` the grid's rows with reactive surface; `slid` the bed's way relative to the reactor [m];
-    `sites`, `sites_initially` (site species,) on the solids in the strip, `sites_passed` those that left minus those that entered; `heat`
-    of a case with `[energy]`.
+    `sites`, `sites_initially` (site species,) the places that each holds on the solids in the strip, `sites_passed` those that left minus
+    those that entered; `heat` of a case with `[energy]`. Events are net, there less back, where a reaction is reversible.
     """
 
     names: tuple[str, ...]
@@ -128,10 +128,10 @@ def run_itself(records: Records) -> dict[str, Any]:
 
 
 def running_surface(case: Case, names: tuple[str, ...]) -> list[SurfaceReaction]:
-    """Surface reactions whose gas is among the species of the run, in the mechanism's order."""
+    """Surface reactions that run with the species of the run, in the mechanism's order."""
     return case.mechanism.running_surface(names)
 
 
 def running_gas(case: Case, names: tuple[str, ...]) -> list[GasReaction]:
-    """Gas reactions whose reactants all are."""
+    """Gas reactions that do."""
     return case.mechanism.running_gas(names)

@@ -1,0 +1,85 @@
+"""Mechanisms with any rate law, written in Python, and cases that have them: what tests of reports and advice share."""
+
+from collections.abc import Mapping
+
+from mpm.case.case import Case
+from mpm.physics.mechanism import Mechanism
+from mpm.physics.rates import Arrhenius, Law
+from mpm.physics.reaction import SurfaceReaction
+from mpm.physics.substances import Site, Species
+
+
+def law(constant: float | None, orders: Mapping[str, float], sites: Mapping[str, float]) -> Law:
+    """A law of concentrations and shares, with a constant per area."""
+    return Law(
+        constant=None if constant is None else Arrhenius(constant), gas_orders=orders, site_orders=sites
+    )
+
+
+def surface(
+    key: str,
+    nu: Mapping[str, float],
+    forward: Law,
+    backward: Law | None = None,
+    gases: Mapping[str, float] | None = None,
+    film: Mapping[str, float] | None = None,
+    equilibrium: float | None = None,
+) -> SurfaceReaction:
+    """A surface reaction that changes sites by `nu` and gases by `gases` per event."""
+    left = " + ".join(f"{-n:g} {name}" for name, n in {**(gases or {}), **nu}.items() if n < 0)
+    return SurfaceReaction(
+        key=key,
+        equation=f"{left} {'->' if backward is None else '<=>'} ...",
+        forward=forward,
+        backward=backward,
+        equilibrium=None if equilibrium is None else Arrhenius(equilibrium),
+        nu_gas=gases or {},
+        nu_site=nu,
+        film=film or {},
+    )
+
+
+def mechanism(
+    *reactions: SurfaceReaction, species: tuple[Species, ...], sites: tuple[Site, ...]
+) -> Mechanism:
+    """All of it on the surface; films are what the reactions make."""
+    films = dict.fromkeys(name for r in reactions for name in r.film)
+    return Mechanism(
+        name="test",
+        species=species,
+        sites=sites,
+        films=tuple(Site(name, {}) for name in films),
+        surface_reactions=reactions,
+        gas_reactions=(),
+    )
+
+
+def with_mechanism(case: Case, mechanism: Mechanism) -> Case:
+    """The same case with other reactions: its tables keep those of its file."""
+    changed = case.model_copy()
+    changed._mechanism = mechanism
+    return changed
+
+
+def pair_on_two_places() -> Mechanism:
+    """A2 sits down on two places as one group (AA) or as two (A), reversibly; A etches the film F, which holds one A."""
+    return Mechanism(
+        name="pair",
+        species=(Species("A2", 0.04, {"A": 2.0}), Species("A3", 0.06, {"A": 3.0})),
+        sites=(Site("*", {}), Site("A", {"A": 1.0}), Site("AA", {"A": 2.0}, places=2.0)),
+        films=(Site("F", {"A": 1.0}),),
+        surface_reactions=(
+            surface("whole", {"*": -2.0, "AA": 1.0}, law(1.0, {"A2": 1.0}, {"*": 2.0}), gases={"A2": -1.0}),
+            surface(
+                "split",
+                {"*": -2.0, "A": 2.0},
+                law(2.0, {"A2": 1.0}, {"*": 2.0}),
+                law(1.0, {}, {"A": 2.0}),
+                gases={"A2": -1.0},
+            ),
+            surface(
+                "etch", {"A": -2.0, "*": 2.0}, law(1.0, {}, {"A": 2.0}), gases={"A3": 1.0}, film={"F": -1.0}
+            ),
+        ),
+        gas_reactions=(),
+    )
