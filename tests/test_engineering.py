@@ -46,7 +46,7 @@ def test_excess_number(
     )
     found = inlet_excess(changed, changed.geometry.inlets[1])
     assert found is not None
-    species, excess, ratio = found
+    species, excess, ratio, _ = found
     assert species == "TMA"
     assert excess == pytest.approx(expected, rel=3e-4)
     assert ratio == excess

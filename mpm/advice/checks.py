@@ -32,7 +32,6 @@ from mpm.physics.fluidisation import (
 )
 from mpm.physics.mechanism import mole_fractions
 from mpm.physics.porous import effective_diffusivity
-from mpm.physics.saturation import coverage_met, slowest_turnover, uptake
 from mpm.plain import plain
 from mpm.report.dosing import inlet_excess
 
@@ -162,10 +161,8 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     found = inlet_excess(case, inlet)
     if found is None or layer is None or layer.material is None:
         return numbers
-    species, numbers["excess_number"], numbers["dose_ratio"] = found
-    mechanism, material = case.mechanism, layer.material
-    met = coverage_met(mechanism, species, material.initial_coverage, gas.temperature) or {}
-    k = uptake(mechanism, species, met, gas.temperature)
+    species, numbers["excess_number"], numbers["dose_ratio"], saturated = found
+    mechanism, material, k = case.mechanism, layer.material, saturated.speed
     molecular = material.pore_diffusivity(
         gas.diffusivity[species], mechanism.get(species).molar_mass, gas.temperature
     )
@@ -183,10 +180,7 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
             surface_to_volume=surface, rate_constant=k, diffusivity=diffusivity
         )
         numbers["gas_lifetime"] = material.porosity / (surface * k)
-        turnover = slowest_turnover(mechanism, species, met, gas.temperature)
-        if turnover > 0.0:
-            per_site = turnover * numbers["concentrations"][species]
-            numbers["site_lifetime"] = material.site_density / per_site
+        numbers["site_lifetime"] = saturated.lifetime
     if velocity > 0.0:
         numbers["Damkoehler_convection"] = eng.damkoehler_convection(
             surface_to_volume=surface, rate_constant=k, length=layer.height, velocity=velocity

@@ -70,7 +70,9 @@ class Mechanism:
     def titrated_sites(self, species: str) -> tuple[str, ...]:
         """The site species that the half-reactions of `species` make and do not consume: all of its making on a saturated surface.
 
-        Where they consume every one (OH -> X -> OH) all that they make.
+        Where they consume every one (OH -> X -> OH) all that they make. What they make may change further without a gas, as a molecule
+        that sits down first and reacts afterwards does: then those made in the end, if any stay. Empty where `species` leaves the sites as
+        they are, as in growth that does not stop.
         """
         made: dict[str, None] = {}
         used: set[str] = set()
@@ -79,7 +81,36 @@ class Mechanism:
                 if sign * reaction.nu_gas.get(species, 0.0) < 0.0:
                     made |= dict.fromkeys(name for name, nu in reaction.nu_site.items() if sign * nu > 0.0)
                     used |= {name for name, nu in reaction.nu_site.items() if sign * nu < 0.0}
-        return tuple(name for name in made if name not in used) or tuple(made)
+        first = tuple(name for name in made if name not in used) or tuple(made)
+        while True:
+            later, gone = self._changed_alone(species, made, used)
+            if later.keys() <= made.keys() and gone <= used:
+                return tuple(name for name in made if name not in used) or first
+            made, used = made | later, used | gone
+
+    def _changed_alone(
+        self, species: str, made: Mapping[str, None], used: Collection[str]
+    ) -> tuple[dict[str, None], set[str]]:
+        """What becomes without a gas of sites that `made` has or that were there (`used`), and those that are gone for good.
+
+        Nothing that gives `species` back: that is its desorption.
+        """
+        later: dict[str, None] = {}
+        gone: set[str] = set()
+        for reaction in self.surface_reactions:
+            for sign, law in reaction.ways:
+                before = {name for name, nu in reaction.nu_site.items() if sign * nu < 0.0}
+                if (
+                    law.gas_orders
+                    or sign * reaction.nu_gas.get(species, 0.0) > 0.0
+                    or not before & made.keys()
+                    or not before <= made.keys() | used
+                ):
+                    continue
+                later |= dict.fromkeys(name for name, nu in reaction.nu_site.items() if sign * nu > 0.0)
+                if reaction.backward is None:
+                    gone |= before
+        return later, gone
 
     @property
     def reactions(self) -> tuple[SurfaceReaction | GasReaction, ...]:

@@ -1,16 +1,107 @@
 """What saturation with a precursor takes: all reactions of that precursor together, whatever their number and order.
 
-A precursor may titrate several kinds of sites, one site in several ways, or one after another (OH -> X -> Y). The functions here follow a
-surface until none of its reactions is left, and count.
+A precursor may titrate several kinds of sites, one site in several ways, or one after another (OH -> X -> Y). Where every reaction is one
+gas that meets one site and never goes back (`Mechanism.is_first_order`), the functions here follow a surface until none of its reactions
+is left, and count. Of other mechanisms the surface is followed in time (`mpm.physics.exposure`): where reactions go back, what stays on it
+depends on the concentration.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
+from mpm.physics.exposure import NOTHING, Exposed, SurfaceRates, expose
 from mpm.physics.mechanism import Mechanism
 from mpm.physics.reaction import SurfaceReaction
+
+Gas = Mapping[str, float]
+"""Concentrations [mol/m3] by species."""
+_MORE = 1.01
+"""Factor by which a surface must take more than another one to be what a precursor is for: less is an error of a time step."""
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """What a precursor does to the solids: the coverage that it `met`, and from there on
+
+    `speed` [m/s] at which it is taken up at first, flux over concentration; `need`: molecules per place until nothing changes any more,
+    None where that never comes, as with growth that does not stop and with catalysis; `lifetime` [s] of the sites, in which of what it
+    takes all but 1/e has been taken; of the kind that it turns over last where several do, each by itself.
+    """
+
+    met: Mapping[str, float]
+    speed: float
+    need: float | None
+    lifetime: float | None
+
+
+def saturation(
+    mechanism: Mechanism,
+    species: str,
+    gas: Gas,
+    fresh: Mapping[str, float],
+    temperature: float,
+    site_density: float,
+    others: Iterable[Gas] = (),
+) -> Saturation:
+    """What `species` in a `gas` that is fed does to `fresh` solids with `site_density` [mol/m2] at `temperature` [K].
+
+    `others`: the gases of other feeds, what they make of the solids counts too (`coverage_met`, `_met`). The gas is what the precursor is
+    fed with; alone, where one is enough, which is so in a mechanism of first order.
+    """
+    if not mechanism.is_first_order:
+        return _saturation_in_time(mechanism, species, gas, fresh, temperature, site_density, others)
+    met = coverage_met(mechanism, species, fresh, temperature) or {}
+    speed, lifetime = uptake(mechanism, species, met, temperature), None
+    if speed > 0.0:
+        per_site = slowest_turnover(mechanism, species, met, temperature) * gas[species]
+        lifetime = site_density / per_site if per_site > 0.0 else None
+    need = molecules_per_site(mechanism, species, fresh, temperature)
+    return Saturation(met, speed, need or None, lifetime)
+
+
+def _saturation_in_time(
+    mechanism: Mechanism,
+    species: str,
+    gas: Gas,
+    fresh: Mapping[str, float],
+    temperature: float,
+    site_density: float,
+    others: Iterable[Gas],
+) -> Saturation:
+    met, after = _met(mechanism, species, gas, fresh, temperature, site_density, others)
+    if after is None:
+        return Saturation({}, 0.0, None, None)
+    rates = SurfaceRates(mechanism, gas, temperature, site_density)
+    flux = site_density * rates.taken(met)[species]
+    need = None if species in after.endless else after.taken[species]
+    return Saturation(met, max(flux, 0.0) / gas[species], need, after.time(species, 1.0 - math.exp(-1.0)))
+
+
+def _met(
+    mechanism: Mechanism,
+    species: str,
+    gas: Gas,
+    fresh: Mapping[str, float],
+    temperature: float,
+    site_density: float,
+    others: Iterable[Gas],
+) -> tuple[Mapping[str, float], Exposed | None]:
+    """The coverage that takes most of `species`, and what becomes of it: that of fresh solids, or what other feeds make of it in turn.
+
+    So TMA meets OH, and water what TMA leaves although some of it may sit down on OH. None where all take none.
+    """
+    current, best, chosen, most = fresh, fresh, None, NOTHING
+    feeds: list[Gas | None] = [None, *others]
+    for feed in feeds:
+        left = None if feed is None else expose(mechanism, feed, current, temperature, site_density)
+        current = current if left is None else left.coverage
+        after = expose(mechanism, gas, current, temperature, site_density)
+        if after is not None and after.taken[species] > _MORE * most:
+            best, chosen, most = current, after, after.taken[species]
+    return best, chosen
 
 
 def site_speeds(

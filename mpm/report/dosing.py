@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from mpm.physics.saturation import molecules_per_site
+from mpm.physics.saturation import Saturation, saturation
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
+    from mpm.case.materials import Material
     from mpm.case.ports import Inlet
     from mpm.case.zones import Zone
 
@@ -42,13 +43,14 @@ def excess_number(
 class Excess(NamedTuple):
     """What an inlet feeds: molecules of its `species` per passing site, and how many times what saturation needs that is.
 
-    Saturation needs 1 molecule of TMA per site, 1.5 of water (`mpm.physics.saturation`). `dose_ratio` is None where the precursor never
-    saturates the surface.
+    Saturation needs 1 molecule of TMA per site, 1.5 of water; where reactions go back, what the feed leaves on the solids
+    (`mpm.physics.saturation`, whose numbers are `saturation`). `dose_ratio` is None where the precursor never saturates the surface.
     """
 
     species: str
     per_site: float
     dose_ratio: float | None
+    saturation: Saturation
 
 
 def inlet_excess(case: Case, inlet: Inlet) -> Excess | None:
@@ -70,8 +72,23 @@ def inlet_excess(case: Case, inlet: Inlet) -> Excess | None:
         surface_to_volume=material.surface_to_volume,
         site_density=material.site_density,
     )
-    need = molecules_per_site(case.mechanism, species, material.initial_coverage, case.gas.temperature)
-    return Excess(species, excess, excess / need if need else None)
+    saturated = inlet_saturation(case, inlet, species, material)
+    ratio = excess / saturated.need if saturated.need else None
+    return Excess(species, excess, ratio, saturated)
+
+
+def inlet_saturation(case: Case, inlet: Inlet, species: str, material: Material) -> Saturation:
+    """What the feed of an inlet, its precursor `species` first, does to a fresh material, or to what other inlets make of it."""
+    feeds = [case.feed_concentrations(i.mass_fractions) for i in case.dosing_inlets if i is not inlet]
+    return saturation(
+        case.mechanism,
+        species,
+        case.feed_concentrations(inlet.mass_fractions),
+        material.initial_coverage,
+        case.gas.temperature,
+        material.site_density,
+        others=feeds,
+    )
 
 
 def excess_numbers(case: Case) -> dict[str, float]:
