@@ -167,11 +167,16 @@ def _exchange(case: Case, material: Material, diameter: float) -> tuple[float, f
     )
 
 
-def _rise(case: Case, material: Material, reaction: SurfaceReaction, heat_capacity: float) -> float:
-    """dT = -dH S n_s/(|nu| C_h) [K]: by how much an insulated bed warms when this reaction turns over every site, |nu| in one event."""
+def _rise(case: Case, material: Material, reaction: SurfaceReaction, heat_capacity: float) -> float | None:
+    """dT = -dH S n_s/(|nu| C_h) [K]: by how much an insulated bed warms when this reaction turns over every place, |nu| in one event.
+
+    None for a reaction that leaves the sites as they are.
+    """
     heat = case.mechanism.heat_of_reaction(reaction, case.gas.temperature)
     sites = material.surface_to_volume * material.site_density
-    return -heat * sites / (-reaction.nu_site[reaction.site] * heat_capacity)
+    places = {site.name: site.places for site in case.mechanism.sites}
+    turned = sum(-nu * places[name] for name, nu in reaction.nu_site.items() if nu < 0.0)
+    return -heat * sites / (turned * heat_capacity) if turned else None
 
 
 def heat_warnings(case: Case, report: dict[str, Any]) -> Iterator[str]:

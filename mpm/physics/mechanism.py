@@ -118,6 +118,11 @@ class Mechanism:
         return (*self.surface_reactions, *self.gas_reactions)
 
     @property
+    def parasitic_reactions(self) -> tuple[GasReaction, ...]:
+        """Gas reactions that do not go back: what they make grows where nobody wants it (CVD). An equilibrium in the gas is none."""
+        return tuple(reaction for reaction in self.gas_reactions if reaction.backward is None)
+
+    @property
     def is_first_order(self) -> bool:
         """Whether every surface reaction is one gas that meets one site, first order in both, with no way back."""
         return all(reaction.is_first_order for reaction in self.surface_reactions) and bool(

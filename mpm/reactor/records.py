@@ -72,10 +72,11 @@ def _zones(system: System) -> NDArray[np.int64]:
 
 
 def cvd_rate(system: System) -> Floats:
-    """Events of gas reactions per total volume in own cells [mol/m3/s]."""
+    """Events of gas reactions that do not go back (`Mechanism.parasitic_reactions`) per total volume in own cells [mol/m3/s]."""
     transport, strip = system.transport, system.strip
     rates, _ = transport.reactions.gas.rates(transport.concentration[: transport.coupled])
-    return np.asarray(rates.sum(axis=0) * strip.porosity[: strip.owned])
+    parasitic = [r.backward is None for r in transport.reactions.gas.reactions]
+    return np.asarray(rates[np.array(parasitic, dtype=bool)].sum(axis=0) * strip.porosity[: strip.owned])
 
 
 def local_fields(system: System) -> dict[str, Floats]:

@@ -22,9 +22,14 @@ if TYPE_CHECKING:
 
 
 def titrated(case: Case, species: str, theta: Floats) -> Floats:
-    """Share of the sites that the half-reactions of `species` have made, from coverages (sites, ...): `Mechanism.titrated_sites` summed."""
+    """Share of the sites that the half-reactions of `species` have made, from coverages (sites, ...): `Mechanism.titrated_sites` summed.
+
+    It is a share of places, of which a site species may hold several. Where reactions go back it stays below 1. A precursor that leaves the
+    sites as they are has made none.
+    """
     names = case.mechanism.site_names
-    return np.sum([theta[names.index(site)] for site in case.mechanism.titrated_sites(species)], axis=0)
+    made = [theta[names.index(site)] for site in case.mechanism.titrated_sites(species)]
+    return np.sum(made, axis=0) if made else np.zeros(theta.shape[1:])
 
 
 def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
@@ -32,7 +37,8 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
 
     `box_mean`: mean over the moving layer from the end of the inlet's zone at which solids enter it to the inlet's centreline;
     `exit_profile`: the zone's column where they leave it, bottom to top; `exit_mean`, `exit_min` of it. Solids enter at the left and leave
-    at the right, a bed that moves backwards the other way (`Case.direction`). Without a moving layer the topmost reactive one counts.
+    at the right, a bed that moves backwards the other way (`Case.direction`). Without a moving layer the topmost reactive one counts. A
+    precursor that leaves the sites as they are, as in growth that does not stop, has no titration.
     """
     layer = conveyed_layer(case)
     if layer is None:
@@ -42,7 +48,7 @@ def titration(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]
     result: dict[str, dict[str, Any]] = {}
     for inlet in case.geometry.inlets:
         species, zone = case.precursor(inlet), zone_of(case, inlet)
-        if species is None or zone is None:
+        if species is None or zone is None or not case.sites_made_by(inlet):
             continue
         theta = titrated(case, species, state.theta)[inside]
         last = exit_column(case, grid, zone)
@@ -83,7 +89,7 @@ def conveyed_layer(case: Case) -> str | None:
 
 
 def utilisation(case: Case, grid: Grid, totals: Totals) -> dict[str, float]:
-    """Per dosing inlet: precursor reacted on surfaces in its zone over what it has fed."""
+    """Per dosing inlet: precursor reacted on surfaces in its zone over what it has fed; net of what comes off the solids there again."""
     result = {}
     for inlet in case.geometry.inlets:
         species, zone = case.precursor(inlet), zone_of(case, inlet)

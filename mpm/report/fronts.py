@@ -101,7 +101,7 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
         if state.temperature is not None:  # hot gas holds less, but that is no front
             field = field * (state.temperature / case.gas.temperature)
         feed = case.feed_concentrations(inlet.mass_fractions)[species]
-        made = titrated(case, species, state.theta)
+        made = titrated(case, species, state.theta) if case.sites_made_by(inlet) else None
         entry: dict[str, Any] = {}
         for layer in case.geometry.layers:
             numbers = front(
@@ -111,7 +111,7 @@ def fronts(case: Case, grid: Grid, state: State) -> dict[str, dict[str, Any]]:
                 center=inlet.center,
                 along=case.direction,
             )
-            coverage = _layer_coverage(grid, state, made, layer.name)
+            coverage = None if made is None else _layer_coverage(grid, state, made, layer.name)
             if coverage is not None:
                 incoming = None
                 if layer.moving and case.geometry.bed_inflow == "fresh":

@@ -63,8 +63,11 @@ def let_out(case: Case, totals: Totals, before: Totals | None, outlet: int) -> f
 
 
 def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:
-    """Parasitic gas reactions now: `rate_mean` over the strip, `rate_max` [mol/m3/s per total volume], `share_in_zone` of the integral."""
-    if not case.mechanism.gas_reactions:
+    """Parasitic gas reactions now: `rate_mean` over the strip, `rate_max` [mol/m3/s per total volume], `share_in_zone` of the integral.
+
+    Those that do not go back (`Mechanism.parasitic_reactions`).
+    """
+    if not case.mechanism.parasitic_reactions:
         return {}
     whole = float(state.cvd.sum())
     area = grid.length * grid.height
@@ -78,12 +81,23 @@ def cvd(case: Case, grid: Grid, state: State) -> dict[str, Any]:
 
 
 def cvd_totals(case: Case, totals: Totals) -> dict[str, Any]:
-    """Events of the parasitic gas reactions over the run [mol/m]: `total`, and `total_in_zone` by zone."""
-    if not running_gas(case, totals.names):
+    """Events of the parasitic gas reactions over the run [mol/m]: `total`, and `total_in_zone` by zone.
+
+    Of several such reactions also what they have `used` of each species: their events differ in what they take.
+    """
+    found = [(i, r) for i, r in enumerate(running_gas(case, totals.names)) if r.backward is None]
+    if not found:
         return {}
-    per_zone = totals.gas.sum(axis=0)
+    per_zone = totals.gas[[i for i, _ in found]].sum(axis=0)
     zones = {zone.name: float(per_zone[number]) for number, zone in enumerate(case.geometry.zones, start=1)}
-    return {"total": float(per_zone.sum()), "total_in_zone": zones}
+    numbers: dict[str, Any] = {"total": float(per_zone.sum()), "total_in_zone": zones}
+    if len(case.mechanism.parasitic_reactions) > 1:
+        taken = {
+            name: -sum(r.nu_gas.get(name, 0.0) * float(totals.gas[i].sum()) for i, r in found)
+            for name in totals.names
+        }
+        numbers["used"] = {name: amount for name, amount in taken.items() if amount > 0.0}
+    return numbers
 
 
 def contamination(case: Case, grid: Grid, totals: Totals, state: State) -> dict[str, dict[str, float]]:

@@ -100,6 +100,8 @@ SECTIONS = (
         Quantity("cvd.total", "parasitic CVD, total", _AMOUNT, f"events of gas reactions over the run, {_DEPTH}", "umol/m", rate=True),
         Quantity("cvd.total_in_zone.<zone>", "parasitic CVD in {zone}", _AMOUNT,
             f"events of gas reactions over the run, {_DEPTH}", "umol/m", rate=True),
+        Quantity("cvd.used.<species>", "{species} lost to parasitic CVD", _AMOUNT,
+            f"what gas reactions took of it over the run, where there are several, {_DEPTH}", "umol/m", rate=True),
     )),
     Section("front", "Fronts", lambda r: fronts(r.case, r.grid, r.state), (
         Quantity("front.<inlet>.<layer>.upstream", "reach of {inlet} against the bed's way, {layer}", "m",

@@ -20,9 +20,11 @@ REMAINDER = 1e-3
 
 def percent(share: float) -> str:
     """A share as a percentage of three digits, not rounded to 0 or 100 when it is more than NOTHING away from them."""
-    if share < NOTHING or share == 1.0:
-        return f"{100.0 * share:.0f} %"
-    if share < TRACE:
+    if abs(share) < NOTHING:
+        return "0 %"
+    if share == 1.0:
+        return "100 %"
+    if 0.0 < share < TRACE:
         return f"less than {100.0 * TRACE:g} %"
     if 1.0 - REMAINDER < share < 1.0:
         lacking = f"{100.0 * (1.0 - share):.1g}"
@@ -74,6 +76,13 @@ def _no_coating(case: Case) -> str:
         return "nothing has been coated: no inlet doses a surface"
     if all(zone_of(case, inlet) is None for inlet in dosing):
         return "no coverage is reported: no zone is that of a dosing inlet (geometry.zone.NAME.inlet)"
+    unchanged = [
+        name for inlet in dosing if (name := case.precursor(inlet)) and not case.sites_made_by(inlet)
+    ]
+    if len(unchanged) == len(dosing):
+        return (
+            f"no coverage is reported: {' and '.join(dict.fromkeys(unchanged))} leaves the sites as they are"
+        )
     return "no coverage has been reported"
 
 
@@ -102,23 +111,26 @@ def _made(case: Case, species: str | None) -> str:
 
 def growth_share(case: Case, summary: Mapping[str, Any]) -> float | None:
     """Parasitic gas reactions over the run as the largest share of a fed precursor that they have taken; None without such reactions."""
-    total = summary.get("cvd", {}).get("total")
+    numbers = summary.get("cvd", {})
+    total, used = numbers.get("total"), numbers.get("used")
     if total is None:
         return None
     fed = {name: entry.get("fed", 0.0) for name, entry in summary.get("species", {}).items()}
-    shares = [
-        -count * total / fed[species]
-        for reaction in case.mechanism.gas_reactions
-        for species, count in reaction.nu_gas.items()
-        if count < 0.0 and fed.get(species, 0.0) > 0.0
-    ]
+    if used is None:
+        used = {
+            species: -count * total
+            for reaction in case.mechanism.parasitic_reactions
+            for species, count in reaction.nu_gas.items()
+            if count < 0.0
+        }
+    shares = [amount / fed[name] for name, amount in used.items() if fed.get(name, 0.0) > 0.0]
     return max(shares, default=None)
 
 
 def _growth(case: Case, summary: Mapping[str, Any]) -> list[str]:
     share = growth_share(case, summary)
     if share is None:
-        return ["no parasitic growth in the gas"] if case.mechanism.gas_reactions else []
+        return ["no parasitic growth in the gas"] if case.mechanism.parasitic_reactions else []
     return [
         "no parasitic growth in the gas"
         if share < NOTHING
