@@ -60,6 +60,12 @@ def same_kind(symbol: str, unit: str) -> bool | None:
     return None if given is None or wanted is None else given[1] == wanted[1]
 
 
+def in_base_units(number: str, symbol: str) -> tuple[float, Dimensions] | None:
+    """`number` in units of `symbol` as the float that counts SI base units, and the powers of these; None where pint has to be asked."""
+    given = _product(symbol)
+    return None if given is None else (float(Decimal(number).scaleb(given[0], UNBOUNDED)), given[1])
+
+
 @cache
 def _product(text: str) -> tuple[int, Dimensions] | None:
     """Power of ten and base units of a product such as "um^2", "m^3/kmol/s" or "Pa s"; None for another one."""

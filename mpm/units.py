@@ -19,6 +19,7 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from mpm.metric import UNBOUNDED, in_metric, same_kind
+from mpm.metric import in_base_units as in_metric_base_units
 from mpm.spelling import advice
 
 _NUMBER = re.compile(
@@ -82,6 +83,36 @@ def parse(text: str, unit: str) -> float:
         return math.radians(float(number))  # the float next to the true value; decimals of pi would miss it
     with localcontext(UNBOUNDED):
         return float(registry.Quantity(Decimal(number), given).to(wanted).magnitude)
+
+
+_BASE = {
+    "[length]": "m",
+    "[mass]": "kg",
+    "[time]": "s",
+    "[substance]": "mol",
+    "[temperature]": "K",
+    "[current]": "A",
+    "[luminosity]": "cd",
+}
+
+
+@lru_cache(maxsize=4096)
+def in_base_units(text: str) -> tuple[float, dict[str, float]]:
+    """A quantity of any dimension, powers that are no integers included, as the float that counts SI base units, and the powers of these.
+
+    Raises ValueError with a short reason: no number, no unit, unknown unit.
+    """
+    number, symbol, written = _parts(text)
+    if (metric := in_metric_base_units(number, symbol)) is not None:
+        return metric[0], dict(metric[1])
+    registry = _registry()
+    try:
+        given = registry.Unit(symbol)
+        powers = {_BASE[name]: float(power) for name, power in given.dimensionality.items()}
+        with localcontext(UNBOUNDED):
+            return float(registry.Quantity(Decimal(number), given).to_base_units().magnitude), powers
+    except Exception as error:  # pint raises many types here, down to tokenizer errors
+        raise ValueError(f"unknown unit {written!r}") from error
 
 
 def is_counted(text: str, unit: str) -> bool:
@@ -281,6 +312,7 @@ MolarMass = Annotated[float, Dimension("kg/mol", "a molar mass", "28.01 g/mol", 
 MolarEnergy = Annotated[float, Dimension("J/mol", "an activation energy", "20 kJ/mol")]
 MolarEnthalpy = Annotated[float, Dimension("J/mol", "an enthalpy", "-86.5 kJ/mol")]
 MolarHeatCapacity = Annotated[float, Dimension("J/mol/K", "a molar heat capacity", "35.7 J/mol/K", above=0.0)]
+MolarEntropy = Annotated[float, Dimension("J/mol/K", "a molar entropy", "188.8 J/mol/K")]
 HeatFlux = Annotated[float, Dimension("W/m^2", "a heat flux", "1 kW/m^2")]
 HeatTransfer = Annotated[float, Dimension("W/m^2/K", "a heat transfer coefficient", "10 W/m^2/K", above=0.0)]
 Heating = Annotated[float, Dimension("W/m^3", "a heating by volume", "1e5 W/m^3")]
@@ -292,6 +324,8 @@ Sphericity = Annotated[float, Dimension("", "a sphericity", "0.79", above=0.0)]
 Kozeny = Annotated[float, Dimension("", "a number", "4.2", above=0.0)]
 Positive = Annotated[float, Dimension("", "a number", "1.5", above=0.0)]
 NonNegative = Annotated[float, Dimension("", "a number", "0.30", at_least=0.0)]
+Order = Annotated[float, Dimension("", "an order", "0.5", at_least=0.0, at_most=4.0)]
+Places = Annotated[float, Dimension("", "a number of places", "2", above=0.0)]
 Atoms = Annotated[float, Dimension("", "a number of atoms", "3", at_least=0.0)]
 Fraction = Annotated[float, Dimension("", "a fraction", "2e-4", at_least=0.0, at_most=1.0)]
 Coverage = Annotated[float, Dimension("", "a fraction", "1", at_least=0.0, at_most=1.0)]

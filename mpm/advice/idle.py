@@ -15,7 +15,7 @@ from mpm.case.materials import BUILT_IN, Material
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-    from mpm.case.chemistry import SiteTable, SpeciesTable
+    from mpm.case.chemistry import SolidTable, SpeciesTable
 
 _CYCLE = ("frequency", "angle", "angle_from", "liftoff_velocity", "liftoff_phase", "contact_phase")
 """Keys of [motion] that shape the cycle, not its mean."""
@@ -172,7 +172,7 @@ def _of_mechanism(case: Case) -> Idle:
     for name, table in case.chemistry.reaction.items():
         if table.reference_temperature != 1.0 and table.b == 0.0:
             yield f"chemistry.reaction.{name}.reference_temperature", "b is 0"
-    tables: dict[str, Mapping[str, SpeciesTable | SiteTable]] = {
+    tables: dict[str, Mapping[str, SpeciesTable | SolidTable]] = {
         "species": case.chemistry.species,
         "site": case.chemistry.site,
         "film": case.chemistry.film,

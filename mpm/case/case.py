@@ -77,7 +77,7 @@ class Case(CaseTables):
         """The resolved case as the tables of a case file, dimensional values as strings in SI units."""
         tables: dict[str, Any] = self.model_dump(mode="json", by_alias=True, exclude_none=True)
         if self.energy is None and self.chemistry.mechanism != "inline":
-            drop_heats(tables["chemistry"])
+            drop_heats(tables["chemistry"], self.mechanism.equilibrated)
         return tables
 
     def to_toml(self) -> str:

@@ -21,6 +21,7 @@ ENTRIES = {
     "diffusivity": "species",
     "initial_coverage": "site",
     "elements": "element",
+    "orders": "substance",
 }
 """What the entries of a table of numbers are named after."""
 
@@ -73,6 +74,10 @@ _TOGETHER = (
     (*(f"chemistry.{k}.<name>.enthalpy" for k in ("species", "site", "film")), "chemistry.reaction.<name>.heat_of_reaction"),
     ("fidelity", "time.end", "time.step", "time.steps_per_cycle", "transport.vibrational_dispersion"),
     tuple(f"chemistry.reaction.<name>.{key}" for key in ("equation", "sticking", "A", "b", "Ea", "reference_temperature")),
+    tuple(f"chemistry.reaction.<name>.{key}" for key in ("equation", "orders", "reverse", "equilibrium_constant", "coverage")),
+    ("chemistry.reaction.<name>.sticking", "chemistry.reaction.<name>.motz_wise"),
+    ("chemistry.reference_pressure", *(f"chemistry.{k}.<name>.{x}" for k in ("species", "site") for x in ("enthalpy", "entropy", "nasa"))),
+    ("chemistry.site.<name>.sites", "material.<name>.site_density"),
 )  # fmt: skip
 """Keys that are set with an eye on each other."""
 
@@ -212,7 +217,7 @@ def _entry_of_table(dotted: str, entry: Mapping[str, Any], name: str) -> Key:
     return _leaf(f"{dotted}.<{ENTRIES[name]}>", dotted, about, False)
 
 
-_KINDS = {"boolean": "true or false", "string": "text", "integer": "a whole number", "array": "a list of pairs of times"}  # fmt: skip
+_KINDS = {"boolean": "true or false", "string": "text", "integer": "a whole number"}  # fmt: skip
 
 
 def _kind(entry: Mapping[str, Any]) -> str:
@@ -223,6 +228,8 @@ def _kind(entry: Mapping[str, Any]) -> str:
         return str(entry["accepted"]).partition(", e.g.")[0]
     if "additionalProperties" in entry:
         return "a table of numbers by name"
+    if entry.get("type") == "array":
+        return "a list of pairs of times" if entry["items"].get("type") == "array" else "a list of numbers"
     kind = _KINDS[entry["type"]]
     bounds = [
         f"{word} {entry[key]:g}" for word, key in (("from", "minimum"), ("to", "maximum")) if key in entry

@@ -12,6 +12,10 @@ _ACTIVATION = ("b", "Ea", "reference_temperature")
 _REPLACES = {
     "sticking": ("A",),
     "A": ("sticking",),
+    "reverse": ("equilibrium_constant",),
+    "equilibrium_constant": ("reverse",),
+    "nasa": ("enthalpy", "entropy", "heat_capacity"),
+    **dict.fromkeys(("enthalpy", "entropy", "heat_capacity"), ("nasa",)),
     "windows": ("start", "stop"),
     "kozeny_constant": ("permeability",),
     "permeability": ("kozeny_constant",),
@@ -25,7 +29,9 @@ _REPLACES = {
 def replaced(table: Mapping[str, Any], key: str) -> tuple[str, ...]:
     """Keys of `table` that `key`, written over it, replaces; b and Ea of a rate constant go with it, not those of the same kind."""
     rivals = tuple(rival for rival in _REPLACES.get(key, ()) if rival in table)
-    return (*rivals, *_ACTIVATION) if key in ("sticking", "A") and rivals else rivals
+    if key not in ("sticking", "A") or not rivals:
+        return rivals
+    return (*rivals, *_ACTIVATION, *(("motz_wise",) if key == "A" else ()))
 
 
 def merge(under: Mapping[str, Any], over: Mapping[str, Any]) -> Table:

@@ -8,7 +8,7 @@ merged here, later ones over earlier ones; entries of lists are matched by their
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from mpm.case.materials import BUILT_IN
 from mpm.case.merging import Table, replaced
 from mpm.case.merging import merge as merge  # offered here too
 from mpm.case.profile import PRESETS
+from mpm.case.ratetables import as_equilibrium_table
 from mpm.case.walls import name_walls
 from mpm.errors import InputError
 from mpm.files import is_file, read_text
@@ -106,6 +107,8 @@ def set_key(data: Table, key: str, value: Any, source: str, kept: Collection[str
     for i, part in enumerate(parts[:-1]):
         place = ".".join(parts[: i + 1])
         if isinstance(node, dict):
+            if part not in node:
+                _replace(node, part, parts[:i], kept)
             node = node.setdefault(part, {})
         else:
             node = _entry(node, part, place, source)
@@ -114,10 +117,16 @@ def set_key(data: Table, key: str, value: Any, source: str, kept: Collection[str
     if isinstance(node, list):
         raise InputError.at(source, key, "a whole entry", "a key of that entry, such as name", given="")
     value = value.tolist() if hasattr(value, "tolist") else value  # numpy scalars and arrays
-    for rival in replaced(node, parts[-1]):
-        if ".".join((*parts[:-1], rival)) not in kept:
-            node.pop(rival, None)
+    _replace(node, parts[-1], parts[:-1], kept)
     node[parts[-1]] = deepcopy(value)
+
+
+def _replace(table: Table, key: str, place: Sequence[str], kept: Collection[str]) -> None:
+    """Take out of a table what `key`, about to be written, says in another way, but for what is set beside it."""
+    for rival in replaced(table, key):
+        name = ".".join((*place, rival))
+        if not any(other == name or other.startswith(f"{name}.") for other in kept):
+            table.pop(rival, None)
 
 
 def _entry(entries: list[Any], name: str, place: str, source: str) -> Any:
@@ -142,6 +151,7 @@ def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path
     if "geometry" in result:
         result["geometry"] = _with_base(result["geometry"], folder, source)
     _insert_mechanism(result, folder, source)
+    _spread_equilibria(result)
     gas = result.setdefault("gas", {})
     if isinstance(gas, dict) and not isinstance(gas.get("diffusivity", {}), dict):
         gas["diffusivity"] = {"default": gas["diffusivity"]}
@@ -201,6 +211,14 @@ def _insert_mechanism(data: Table, folder: Path, source: str) -> None:
         data["chemistry"]["mechanism"] = (
             "inline"  # the tables are all here now: the case no longer needs the file
         )
+
+
+def _spread_equilibria(data: Table) -> None:
+    """Equilibrium constants as the tables that they are short for, whose keys can then be set."""
+    reactions = _table(_table(data, "chemistry"), "reaction")
+    for reaction in reactions.values():
+        if isinstance(reaction, dict) and "equilibrium_constant" in reaction:
+            reaction["equilibrium_constant"] = as_equilibrium_table(reaction["equilibrium_constant"])
 
 
 def _insert_materials(data: Table, source: str) -> None:

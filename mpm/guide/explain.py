@@ -23,9 +23,11 @@ _NAMES = {
     "chemistry.site": "OH",
     "chemistry.film": "Al2O3",
     "chemistry.reaction": "tma",
+    "chemistry.reaction.tma.coverage": "OH",
+    "chemistry.reaction.tma.reverse.coverage": "OH",
 }
 """An entry of each kind, for examples."""
-_ENTRY = {"<species>": "TMA", "<site>": "OH", "<element>": "Al"}
+_ENTRY = {"<species>": "TMA", "<site>": "OH", "<element>": "Al", "<substance>": "TMA"}
 _OUTPUT = "summary.json; numbers of a run over time are in history.csv"
 
 Line = tuple[int, str, int]
@@ -88,21 +90,27 @@ def _key(key: Key) -> Iterator[Line]:
             yield 2, f"{label:<{_LABEL}}{text}", _LABEL
 
 
+def _with_entries(name: str) -> str:
+    """A name with an entry of each kind in place of <name>."""
+    for table, entry in _NAMES.items():
+        name = name.replace(f"{table}.<name>", f"{table}.{entry}")
+    for placeholder, entry in _ENTRY.items():
+        name = name.replace(placeholder, entry)
+    return name
+
+
 def _place(key: Key) -> str:
     """The table that a key stands in, as a file opens it."""
     table = key.table.removesuffix(".<name>")
     if table not in _NAMES:
+        table = _with_entries(key.table)
         return f" in [{table}]" if table else ""
     return f" in a [[{table}]]" if table.startswith("geometry.") else f" in [{table}.{_NAMES[table]}]"
 
 
 def _setting(key: Key) -> str:
     """`--set` with an example of this key."""
-    name = key.name
-    for table, entry in _NAMES.items():
-        name = name.replace(f"{table}.<name>", f"{table}.{entry}")
-    for placeholder, entry in _ENTRY.items():
-        name = name.replace(placeholder, entry)
+    name = _with_entries(key.name)
     if not key.example or key.last == "name":
         return ""
     text = key.example.strip('"') if key.example.count('"') == 2 else key.example
@@ -120,7 +128,7 @@ def _table(key: Key) -> Iterator[Line]:
         default = f" [{_plain(below.default_text)}]" if below.default_text != "none" else ""
         yield 2, f"{below.last:<{column}}{below.description}{default}", column
     yield _BLANK
-    example = f"{key.name}.{_NAMES[key.name]}" if key.name in _NAMES else key.name
+    example = _with_entries(f"{key.name}.<name>" if key.entries else key.name)
     yield 0, f"mpm explain {example}.{keys[0].last} says more of one of them.", 0
 
 

@@ -134,7 +134,7 @@ class _Writer:
             said = {place: value for place, value in below.items() if not active or place in self.active}
             text = self.value(key, path, said, active)
         else:
-            text = key.example
+            text = key.default or key.example
         if described:
             yield ""
             yield from _comment(f"{key.description}{_after(key)}", "# ")

@@ -14,21 +14,28 @@ ARROW = re.compile(
 )
 _ONE_WAY = re.compile(r"[-=]+>|[\u2192\u27f6\u21d2\u27f9]")
 _COUNT = re.compile(r"(\d+/\d+|\d+\.?\d*|\.\d+)\s*(\S.*)")
-EQUATION = 'an equation "A + 2 B -> C": -> is the arrow (no back reaction: that is a reaction of its own), coefficients are 2, 0.5 or 1/2'
+_BOTH_WAYS = re.compile(r"<[-=]+>|[\u21cc\u21cb\u2194\u21c4\u27f7\u21d4]")
+EQUATION = 'an equation "A + 2 B -> C": -> is the arrow, <=> that of a reaction that goes both ways; coefficients are 2, 0.5 or 1/2'
 
 
 def parse_equation(equation: str, known: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, float]]:
     """Split `A + 2 B -> C` into the coefficients of its two sides; every name must be one of `known`.
 
-    `=>` and the arrows of Unicode are read as `->`, blanks around + may be missing. Raises the validator error that names the unknown
-    species, with its nearest neighbour, or says how an equation is written.
+    `=>` is read as `->`, `<->` as `<=>`, and so are the arrows of Unicode; blanks around + may be missing. `=` alone is refused: Cantera
+    means both ways by it, others one. Raises the validator error that names the unknown species, with its nearest neighbour, or says how an
+    equation is written.
     """
     arrows = ARROW.findall(equation)
-    if len(arrows) != 1 or not _ONE_WAY.fullmatch(arrows[0]):
+    if len(arrows) != 1 or not (_ONE_WAY.fullmatch(arrows[0]) or _BOTH_WAYS.fullmatch(arrows[0])):
         found = f"{equation!r}, with " + (" and ".join(arrows) if arrows else "no arrow")
         raise reject(found, EQUATION, key="equation")
     left, right = equation.split(arrows[0])
     return _side(left, equation, known), _side(right, equation, known)
+
+
+def is_reversible(equation: str) -> bool:
+    """Whether the arrow of an equation goes both ways."""
+    return _BOTH_WAYS.search(equation) is not None
 
 
 def _side(side: str, equation: str, known: Mapping[str, Any]) -> dict[str, float]:
@@ -60,10 +67,10 @@ def _term(text: str, known: Mapping[str, Any]) -> tuple[str, float]:
     return match.group(2), float(above) / float(below or 1) if float(below or 1) else math.inf
 
 
-def write_equation(left: Mapping[str, float], right: Mapping[str, float]) -> str:
-    """Compose `A + 2 B -> C` from the coefficients of its two sides."""
+def write_equation(left: Mapping[str, float], right: Mapping[str, float], reversible: bool = False) -> str:
+    """Compose `A + 2 B -> C`, or with `<=>`, from the coefficients of its two sides."""
 
     def side(terms: Mapping[str, float]) -> str:
         return " + ".join(name if count == 1.0 else f"{count:g} {name}" for name, count in terms.items())
 
-    return f"{side(left)} -> {side(right)}"
+    return f"{side(left)} {'<=>' if reversible else '->'} {side(right)}"

@@ -21,7 +21,7 @@ from mpm.constants import GAS_CONSTANT
 from mpm.physics.rates import Law
 from mpm.physics.reaction import GasReaction, Reaction, SurfaceReaction
 from mpm.physics.substances import Site, Species
-from mpm.physics.thermochemistry import STANDARD_TEMPERATURE
+from mpm.physics.thermochemistry import STANDARD_TEMPERATURE, Thermochemistry
 
 REFERENCE_PRESSURE = 1e5
 """[Pa], at which entropies of gases are tabulated."""
@@ -173,6 +173,22 @@ class Mechanism:
             return np.asarray(
                 np.exp(-change / (GAS_CONSTANT * T)) * (self.reference_pressure / (GAS_CONSTANT * T)) ** gases
             )
+
+    def thermochemistry(self, name: str) -> Thermochemistry:
+        """What is known of the enthalpy and entropy of a species, site or film."""
+        return self._parts[name].thermochemistry
+
+    @property
+    def equilibrated(self) -> frozenset[str]:
+        """Names of all whose enthalpy and entropy set the rate of some way back."""
+        return frozenset(
+            name
+            for reaction in self.reactions
+            if reaction.backward is not None
+            and reaction.backward.constant is None
+            and reaction.equilibrium is None
+            for name in reaction.changes
+        )
 
     def without_gibbs(self, reaction: Reaction) -> tuple[str, ...]:
         """Names of what a reaction changes and of which enthalpy or entropy is not known."""
