@@ -262,7 +262,7 @@ def test_an_inline_mechanism_starts_from_nothing() -> None:
         ({"equation": "OH + OAl(CH3)2 <=> OH + OAl(CH3)2", "A": "1 m/s"}, "changes something"),
         ({"equation": "OH + TMA -> CH4 + OAl(CH3)2"}, "neither sticking nor A"),
         ({"equation": "OH + TMA -> CH4 + OAl(CH3)2", "A": "1 m/s", "sticking": 0.1}, "both sticking and A"),
-        ({"equation": "TMA + 3 H2O -> 3 CH4 + Al(OH)3", "sticking": 0.1}, "second-order"),
+        ({"equation": "TMA + 3 H2O -> 3 CH4 + Al(OH)3", "sticking": 0.1}, "order 1 in TMA, 1 in H2O"),
         ({"equation": "TMA -> TMA", "A": "1 m^3/mol/s"}, "changes something"),
         ({"equation": "OH + TMA = CH4 + OAl(CH3)2", "A": "1 m/s"}, "-> is the arrow"),
         ({"equation": "OH -> TMA -> OH", "A": "1 m/s"}, "with -> and ->"),

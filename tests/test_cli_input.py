@@ -302,7 +302,7 @@ BROKEN: dict[str, tuple[Edits, str, str]] = {
     "rate constant of the wrong order": (
         swap(ALUMINA, ALUMINA + '[chemistry.reaction.cvd]\nA = "1 m/s"\n'),
         "chemistry.reaction.cvd.A",
-        "second-order",
+        "order 1 in TMA, 1 in H2O",
     ),
     "flat angle": (swap('"60 deg"', '"0 deg"'), "motion.angle", "vertical component"),
     "unknown fidelity": (swap('"averaged"', '"average"'), "fidelity", "did you mean averaged?"),

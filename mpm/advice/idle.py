@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _CYCLE = ("frequency", "angle", "angle_from", "liftoff_velocity", "liftoff_phase", "contact_phase")
 """Keys of [motion] that shape the cycle, not its mean."""
+_TABLES = ("species", "site", "film", "reaction")
 _ISOTHERMAL = "temperature is one number, gas.temperature"
 
 
@@ -31,6 +32,7 @@ def idle_keys(case: Case) -> list[str]:
         *_of_ports(case),
         *_of_energy(case),
         *_of_solids(case),
+        *_of_entropies(case),
         *_of_mechanism(case),
     ):
         reasons.setdefault(why, []).append(key)
@@ -118,10 +120,12 @@ def _of_energy(case: Case) -> Idle:
             for key in ("heat_capacity", "conductivity")
             if key in case.typed("gas")
         )
-        for table in ("species", "site", "film", "reaction"):
+        for table in _TABLES:
             for name in case.typed(f"chemistry.{table}"):
                 typed = case.typed(f"chemistry.{table}.{name}")
                 keys = (*HEATS, *(("viscosity",) if table == "species" else ()))
+                if table != "reaction" and name in case.mechanism.equilibrated:
+                    keys = ("viscosity",)
                 yield from ((f"chemistry.{table}.{name}.{key}", _ISOTHERMAL) for key in keys if key in typed)
         return
     if not case.gas.mixture:
@@ -168,10 +172,30 @@ def _of_solids(case: Case) -> Idle:
             yield f"material.{name}.kozeny_constant", "it needs a particle_diameter"
 
 
+def _of_entropies(case: Case) -> Idle:
+    """Entropies are read where a way back follows from them; with temperature as one number so are enthalpies (`_of_energy`)."""
+    why = "no way back of a reaction follows from enthalpies and entropies"
+    if case.energy is not None:
+        for table in _TABLES[:3]:
+            for name in case.typed(f"chemistry.{table}"):
+                if (
+                    "entropy" in case.typed(f"chemistry.{table}.{name}")
+                    and name not in case.mechanism.equilibrated
+                ):
+                    yield f"chemistry.{table}.{name}.entropy", why
+    if not case.mechanism.equilibrated:
+        yield from _typed(case.chemistry, "chemistry", ["reference_pressure"], why)
+
+
 def _of_mechanism(case: Case) -> Idle:
     for name, table in case.chemistry.reaction.items():
-        if table.reference_temperature != 1.0 and table.b == 0.0:
-            yield f"chemistry.reaction.{name}.reference_temperature", "b is 0"
+        for key, constant in (
+            ("", table),
+            (".reverse", table.reverse),
+            (".equilibrium_constant", table.equilibrium_constant),
+        ):
+            if constant is not None and constant.reference_temperature != 1.0 and constant.b == 0.0:
+                yield f"chemistry.reaction.{name}{key}.reference_temperature", "b is 0"
     tables: dict[str, Mapping[str, SpeciesTable | SolidTable]] = {
         "species": case.chemistry.species,
         "site": case.chemistry.site,

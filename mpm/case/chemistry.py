@@ -12,10 +12,10 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from mpm.case.model import Flag
-from mpm.case.ratetables import CoverageTable, Equilibrium, MechanismTable, RateConstant, ReverseTable
+from mpm.case.ratetables import Coverages, Equilibrium, MechanismTable, RateConstant, Reverse
 from mpm.case.schema import DRAFT, finished
 from mpm.physics.mechanism import REFERENCE_PRESSURE
 from mpm.units import (
@@ -34,6 +34,7 @@ from mpm.units import (
     Sticking,
     Temperature,
     Viscosity,
+    reject,
     worked_out,
 )
 
@@ -58,15 +59,33 @@ _WATER_HIGH = [
     4.9667701,
 ]
 """Water in GRI-Mech 3.0."""
-_SEVEN = Annotated[tuple[Number, ...], Field(min_length=7, max_length=7)]
+
+
+def _of_length(count: int, what: str) -> AfterValidator:
+    def check(values: tuple[float, ...]) -> tuple[float, ...]:
+        if len(values) != count:
+            raise reject(f"{len(values)} numbers", what)
+        return values
+
+    return AfterValidator(check)
+
+
+_SEVEN = Annotated[
+    tuple[Number, ...],
+    _of_length(7, "seven numbers, a1 to a7"),
+    Field(json_schema_extra={"minItems": 7, "maxItems": 7}),
+]
+_THREE = Annotated[
+    tuple[Positive, ...],
+    _of_length(3, "three temperatures in K, e.g. [200, 1000, 3500]"),
+    Field(json_schema_extra={"minItems": 3, "maxItems": 3}),
+]
 
 
 class NasaTable(MechanismTable):
     """`[species.NAME.nasa]`: enthalpy, entropy and heat capacity as polynomials of temperature, seven numbers in each of two ranges."""
 
-    temperatures: Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)] = Field(
-        examples=[[200.0, 1000.0, 3500.0]]
-    )
+    temperatures: _THREE = Field(examples=[[200.0, 1000.0, 3500.0]])
     """the lowest temperature in K, the one between the two ranges, and the highest; beyond them the polynomials are continued"""
     low: _SEVEN = Field(examples=[_WATER_LOW])
     """the seven numbers of the range below the middle temperature, as NASA, Chemkin and Cantera order them"""
@@ -153,9 +172,9 @@ class ReactionTable(MechanismTable):
     """temperature at which the factor of b is 1"""
     orders: dict[str, Order] | None = Field(None, examples=[{"H2O": 0.5}])
     """orders in gases and sites, by name; left out: 1 in each reactant, and with <=> the coefficients, as an equilibrium asks for"""
-    coverage: dict[str, CoverageTable] | None = None
+    coverage: Coverages | None = None
     """how the rate constant depends on coverages, by site; where the way back follows from an equilibrium, its constant too"""
-    reverse: ReverseTable | None = None
+    reverse: Reverse | None = None
     """rate of the way back of a reaction with <=>; without it and equilibrium_constant it follows from enthalpies and entropies"""
     equilibrium_constant: Equilibrium | None = None
     """K of a reaction with <=>: products over reactants, concentrations in mol/m^3, coverages as shares; or a table of A, b and Ea"""

@@ -11,7 +11,7 @@ from typing import Any, get_origin
 from pydantic import BaseModel
 
 from mpm.case.materials import BUILT_IN
-from mpm.case.places import tables_in
+from mpm.case.places import bare, tables_in
 from mpm.case.schema import finished, number_text
 from mpm.case.sources import built_in_files
 from mpm.case.tables import CaseTables
@@ -173,13 +173,14 @@ def _keys_of_model(model: type[BaseModel], table: str) -> Iterator[Key]:
             if name in ENTRIES:
                 yield _entry_of_table(dotted, entry, name)
             continue
-        named = get_origin(field.annotation) in (tuple, dict)
+        container = get_origin(bare(field.annotation))
+        named = container in (tuple, dict)
         kind: dict[Any, str] = {tuple: f"a list of tables [[{dotted}]]", dict: f"tables [{dotted}.NAME]"}
         yield Key(
             dotted,
             table,
             entry["description"],
-            kind.get(get_origin(field.annotation), f"a table [{dotted}]"),
+            kind.get(container, f"a table [{dotted}]"),
             required=field.is_required(),
             worked_out=entry.get("worked_out", ""),
             is_table=True,

@@ -95,7 +95,8 @@ def _constant(table: ReactionTable, sides: Sides, orders: Orders) -> tuple[Arrhe
             "true without sticking", "motz_wise beside sticking, whose share it corrects", key="motz_wise"
         )
     if not sides.on_surface and (table.sticking is not None or table.A is None):
-        raise reject("sticking" if table.sticking is not None else "no A", orders.accepted, key="A")
+        found = "sticking in a reaction in the gas" if table.sticking is not None else "no A"
+        raise reject(found, orders.accepted, key="A")
     if (table.sticking is None) == (table.A is None):
         found = "both sticking and A" if table.A else "neither sticking nor A"
         accepted = "one of sticking and A" + ("" if table.A else f"; A is {orders.accepted}")
@@ -201,7 +202,7 @@ def _back_from_equilibrium(sides: Sides, forward: Law) -> Law:
             raise reject(
                 f"{forward.coverage[name].m:g}, which makes the order of the way back in {name} "
                 f"{order + forward.coverage[name].m:g}",
-                f"at least {-order:g}",
+                f"at least {0.0 - order:g}",
                 key=f"coverage.{name}.m",
             )
     back = {name: order for name, order in back.items() if order}
@@ -236,12 +237,16 @@ def _coverage(
                 known=list(sides.sites),
             )
         if not sides.on_surface:
-            raise reject("a dependence on coverage of a reaction in the gas", "none", key=key)
+            raise reject(
+                f"a dependence on the coverage of {name} of a reaction in the gas",
+                "none; a reaction on the surface has a site in its equation",
+                key=key,
+            )
         order = orders.site.get(name, 0.0)
         if order + table.m < 0.0:
             raise reject(
                 f"{table.m:g}, which makes the order in {name} {order + table.m:g}",
-                f"at least {-order:g}",
+                f"at least {0.0 - order:g}",
                 key=f"{key}.{name}.m",
             )
     return {name: Dependence(table.a, table.m, table.E) for name, table in (tables or {}).items()}

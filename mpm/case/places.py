@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterator, Sequence
-from typing import Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -24,13 +24,25 @@ def dotted_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         key = prefix + (field.alias or name)
         yield key
-        named = get_origin(field.annotation) in (tuple, dict)
+        named = get_origin(bare(field.annotation)) in (tuple, dict)
         keys = (
             inner
             for table in tables_in(field.annotation)
             for inner in dotted_keys(table, f"{key}.<name>." if named else f"{key}.")
         )
         yield from dict.fromkeys(keys)
+
+
+def bare(annotation: Any) -> Any:
+    """A type without what is annotated to it, and without the None of a key that may be left out."""
+    while True:
+        if get_origin(annotation) is Annotated:
+            annotation = get_args(annotation)[0]
+            continue
+        others = [part for part in get_args(annotation) if part is not type(None)]
+        if get_origin(annotation) not in (Union, types.UnionType) or len(others) != 1:
+            return annotation
+        annotation = others[0]
 
 
 def tables_in(annotation: Any) -> list[type[BaseModel]]:
@@ -51,7 +63,7 @@ def _type(model: type[BaseModel], location: Sequence[int | str]) -> Any:
             current = choices.get(str(part))
         else:
             current = next((a for a in get_args(current) if a not in (str, Ellipsis, type(None))), None)
-        if get_origin(current) in (Union, types.UnionType) and not _by_tag(current):
+        if get_origin(current := bare(current)) in (Union, types.UnionType) and not _by_tag(current):
             current = next((a for a in get_args(current) if a is not type(None)), None)
     return current
 

@@ -18,7 +18,17 @@ from pydantic import (
 from pydantic_core import CoreSchema
 
 from mpm.case.model import Frozen, nothing_required
-from mpm.units import Dimension, MolarEnergy, Number, Order, Temperature, in_base_units, is_counted, reject
+from mpm.units import (
+    Dimension,
+    MolarEnergy,
+    Number,
+    Order,
+    Temperature,
+    describe,
+    in_base_units,
+    is_counted,
+    reject,
+)
 
 SURFACE_RATE = Dimension("m/s", "a surface rate constant", "0.9 m/s", at_least=0.0)
 GAS_RATE = Dimension("m^3/mol/s", "a second-order rate constant", "1.0 m^3/kmol/s", at_least=0.0)
@@ -119,6 +129,17 @@ QUIET = ("sites", "motz_wise", "reference_pressure", "phase", "gas_reactions")
 """Keys that a resolved case leaves out at their defaults, which is what they were before there were these keys."""
 
 
+def a_table(example: str) -> BeforeValidator:
+    """Refuses what is no table with an example of one."""
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, (Mapping, Frozen)):
+            raise reject(describe(value), f"a table, e.g. {example}")
+        return value
+
+    return BeforeValidator(check)
+
+
 class CoverageTable(MechanismTable):
     """`[reaction.KEY.coverage.SITE]`: what the coverage theta of a site does to the rate constant."""
 
@@ -128,6 +149,9 @@ class CoverageTable(MechanismTable):
     """power of the coverage in the rate constant: theta^m"""
     E: MolarEnergy = 0.0
     """activation energy per coverage: exp(-E theta / R T)"""
+
+
+Coverages = dict[str, Annotated[CoverageTable, a_table('{ E = "5 kJ/mol" }')]]
 
 
 class ReverseTable(MechanismTable):
@@ -143,8 +167,11 @@ class ReverseTable(MechanismTable):
     """temperature at which the factor of b is 1 in the rate constant of the way back"""
     orders: dict[str, Order] | None = Field(None, examples=[{"CH4": 1}])
     """orders of the way back, by gas and site; left out: the coefficients of what it consumes"""
-    coverage: dict[str, CoverageTable] | None = None
+    coverage: Coverages | None = None
     """how the rate constant of the way back depends on coverages, by site"""
+
+
+Reverse = Annotated[ReverseTable, a_table('{ A = "1e13 1/s", Ea = "80 kJ/mol" }')]
 
 
 class EquilibriumTable(MechanismTable):

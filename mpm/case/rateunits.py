@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from mpm.case.ratetables import GAS_RATE, SURFACE_RATE, powers_of, unit_text
+from mpm.case.ratetables import powers_of, unit_text
+from mpm.case.schema import number_text
 from mpm.units import reject
 
-_TYPICAL = {"m/s": "0.9", "1/s": "1e13", "m^2/mol/s": "1e17", "m^3/mol/s": "1e5", "mol/m^2/s": "1e-3"}
+_TYPICAL = {"m/s": "0.9", "1/s": "1e13", "m^3/mol/s": "1e-3", "mol/m^2/s": "1e-3"}
+_TYPICAL_PER_SITE = {"1/s": "1e13", "m^2/mol/s": "1e17", "m^3/mol/s": "1e5"}
 """Numbers for examples, of constants that people write down."""
 
 
@@ -49,20 +51,12 @@ class Orders:
     def accepted(self) -> str:
         """Units that A may have, each with an example."""
         of_shares, per_site = unit_text(self.of_shares), unit_text(self.per_site)
-        if not self.on_surface:
-            return (
-                GAS_RATE.accepted if of_shares == GAS_RATE.unit else f"a rate constant {_of(self, of_shares)}"
-            )
-        first = (
-            SURFACE_RATE.accepted
-            if of_shares == SURFACE_RATE.unit
-            else f"a rate constant {_of(self, of_shares)}"
-        )
-        return (
-            first
-            if of_shares == per_site
-            else f'{first}, or per site in {per_site}, e.g. "{_example(per_site)}"'
-        )
+        number = _TYPICAL.get(of_shares, "1")
+        first = f'a rate constant of {self.text}, from 0, in {of_shares}, e.g. "{number} {of_shares}"'
+        if not self.on_surface or of_shares == per_site:
+            return first
+        number = _TYPICAL_PER_SITE.get(per_site, "1")
+        return f'{first}, of coverages as shares, or per site in {per_site}, e.g. "{number} {per_site}"'
 
     def fits(self, text: str) -> bool:
         """Whether A has one of these units."""
@@ -79,15 +73,7 @@ class Orders:
             return value, 0.0
         if self.on_surface and _same(powers, self.per_site):
             return value, sum(self.site.values())
-        raise reject(f"{text!r}, and the rate is of {self.text}", f"{self.accepted}{advice}", key=key)
-
-
-def _of(orders: Orders, unit: str) -> str:
-    return f'for {orders.text} in {unit} from 0, e.g. "{_example(unit)}"'
-
-
-def _example(unit: str) -> str:
-    return f"{_TYPICAL.get(unit, '1')} {unit}"
+        raise reject(f"'{number_text(value)} {unit_text(powers)}'", f"{self.accepted}{advice}", key=key)
 
 
 def _same(powers: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
@@ -105,10 +91,13 @@ def read_equilibrium(value: str | float, gases: float, key: str) -> float:
         number, powers = powers_of(value)
         if _same(powers, wanted):
             return number
-    made = f"{gases:+g} molecules of gas" if gases else "as many molecules of gas come as go"
+        value = f"{number_text(number)} {unit_text(powers)}"
+    made = (
+        f"the reaction makes {gases:+g} molecules of gas" if gases else "as many molecules of gas come as go"
+    )
     accepted = (
         f'an equilibrium constant in {unit}, e.g. "0.5 {unit}"'
         if unit
         else "a number without a unit, e.g. 0.5"
     )
-    raise reject(f"{value!r} ({made})", accepted, key=key)
+    raise reject(f"{value!r}, where {made}", accepted, key=key)

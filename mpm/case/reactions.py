@@ -184,6 +184,6 @@ def _check_balance(
         several = [name for name in sides.of(sides.net, sites) if sites[name].places != 1.0]
         counted = "".join(f", {name} counted as {sites[name].places:g}" for name in several)
         raise reject(
-            f"{equation!r}, which {'gains' if gained > 0 else 'loses'} {abs(gained):g} sites{counted}",
+            f"{equation!r}, which {'gains' if gained > 0 else 'loses'} {abs(gained):g} site{'' if abs(gained) == 1.0 else 's'}{counted}",
             "an equation that keeps the number of sites",
         )

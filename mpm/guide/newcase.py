@@ -43,6 +43,8 @@ _EXAMPLES = {
     "geometry.outlet": "out",
     "geometry.zone": "zone1",
     "geometry.wall": "bottom",
+    "chemistry.reaction.<name>.coverage": "OH",
+    "chemistry.reaction.<name>.reverse.coverage": "OH",
 }
 """Names of the entries that are shown where a case has none of its own."""
 _FOR_REFERENCE = ("material", "chemistry.reaction")
@@ -102,7 +104,7 @@ class _Writer:
             if key.entries:
                 yield from self.entries(key, (*path, key.last))
             else:
-                yield _header(self.is_active((*path, key.last)), f"[{key.name}]")
+                yield _header(self.is_active((*path, key.last)), f"[{_dotted((*path, key.last))}]")
                 yield from self.table(key.name, (*path, key.last))
 
     def entries(self, key: Key, path: Address) -> Iterator[str]:
@@ -121,7 +123,7 @@ class _Writer:
                 yield from _comment(_OWN_POWDER, "# ")
             if index:
                 yield ""
-            yield _header(active, f"[[{key.name}]]" if is_list else f"[{key.name}.{toml_name(name)}]")
+            yield _header(active, f"[[{key.name}]]" if is_list else f"[{_dotted(here)}]")
             yield from self.table(key.name, here, described=index == 0, shown=index == 0 or not active)
 
     def line(self, key: Key, path: Address, described: bool, shown: bool) -> Iterator[str]:
@@ -162,6 +164,11 @@ class _Writer:
     def is_active(self, path: Address) -> bool:
         """Whether this value, or one below this table, is part of what the case says."""
         return any(place[: len(path)] == path for place in self.active)
+
+
+def _dotted(path: Address) -> str:
+    """The name of a table as a file opens it; entries of tables by their names."""
+    return ".".join(map(toml_name, path))
 
 
 def _mechanism(case: Case, folder: Path) -> str:
