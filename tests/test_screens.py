@@ -102,6 +102,7 @@ SCREENS: dict[str, list[str]] = {
     "check, resolved": ["check", "single_zone", "--set", "fidelity=resolved", "--set", "motion.inlet_frame=lab"],
     "check, many ports": ["check", str(ROOT / "meshes" / "four_cycles.toml")],
     "check --full": ["check", "single_zone", "--full"],
+    "mechanism": ["mechanism", "single_cycle"],
     "mesh": ["mesh", "single_zone", "--set", "geometry.cell_width=5 mm"],
     "run": ["run", "single_cycle", "-o", "again", "--overwrite", "--set", "geometry.cell_width=9 mm"],
     "run, steady": ["run", "single_zone", "-o", "still", "--no-report", "--overwrite", "--set", "fidelity=steady"],
@@ -160,10 +161,11 @@ NO_NUMBERS = re.compile(r"^\d+: |(?<![\w.])[0-9a-f]{8,}(?!\w)|\b\d+:\d\d:\d\d\b"
 RATIOS = re.compile(
     r"\b(?:porosity|tortuosity[ _]factor|sphericity|fractions?|mass_fractions\.\w+|Knudsen|Reynolds|Re|Peclet|Damkoehler|Courant|Kn|over|"
     r"share|coverage|ratio|times|molecules|molecule|error|error of|particles of|balances|gamma|drawn back in|continuum|grading|"
-    r"viscosity_ratio|initial_coverage\.\S+|dilute|b)\b"
+    r"viscosity_ratio|initial_coverage\.\S+|dilute|b|order|coverages|sticking|equilibrium|theta)\b"
 )
 COUNTS = re.compile(
-    r"\b(?:cells|columns|rows|facets|steps?|processes|points|phases|steps_per_cycle|ports|done|running|to run|at a time|states)\b"
+    r"\b(?:cells|columns|places|reactions|rows|facets|steps?|processes|points|phases|steps_per_cycle|ports|done|running|to run|at a time|"
+    r"states)\b"
 )
 
 

@@ -3,5 +3,5 @@
 What a verb needs is imported when it is called: `mpm --help` loads neither numpy nor MPI.
 """
 
-from mpm.cli import case, dem, find, look, many, run  # noqa: F401  (each registers its verbs)
+from mpm.cli import case, dem, find, look, many, mechanism, run  # noqa: F401  (each registers its verbs)
 from mpm.cli.program import main as main

@@ -22,6 +22,17 @@ def complete_case(incomplete: str) -> list[str]:
     return [*found, *folders] if found else []
 
 
+def complete_mechanism(incomplete: str) -> list[str]:
+    """Built-in mechanisms and files of Cantera beside what may be a case."""
+    from mpm.case.sources import built_in_files
+
+    if "/" in incomplete:
+        return []
+    here = sorted(path.name for path in Path().iterdir() if path.suffix in (".yaml", ".yml"))
+    found = [name for name in (*built_in_files("mechanisms"), *here) if name.startswith(incomplete)]
+    return [*found, *complete_case(incomplete)]
+
+
 def complete_run(incomplete: str) -> list[str]:
     """Directories of runs in results/."""
     found = (str(file.parent) for file in sorted(Path("results").glob("*/case.toml")))
