@@ -102,7 +102,7 @@ class Search:
         point = Point(
             doses=doses,
             exits={name: entry["exit_mean"] for name, entry in summary["titration"].items()},
-            ratios=summary["dose_ratio"],
+            ratios=summary.get("dose_ratio", {}),
             excess=summary["excess_number"],
             fed=sum(summary["species"][name]["fed"] for name in dosed),
             cvd=summary.get("cvd", {}).get("total", 0.0),  # absent without a gas-phase reaction
@@ -221,10 +221,14 @@ def write_points(directory: Path, search: Search) -> None:
     table = csv.writer(text, lineterminator="\n")
     first = search.points[0]
     names = [f"titration.{inlet}.exit_mean" for inlet in first.exits]
-    names += [f"{kind}.{inlet}" for kind in ("dose_ratio", "excess_number") for inlet in first.ratios]
+    names += [f"{kind}.{inlet}" for kind in ("dose_ratio", "excess_number") for inlet in first.exits]
     table.writerow([*first.doses, *names, "fed", "cvd.total", "cost"])
     for point in search.points:
-        groups = (point.doses, point.exits, point.ratios, point.excess)
-        values = [value for group in groups for value in group.values()]
+        groups = (
+            point.exits,
+            point.ratios,
+            point.excess,
+        )  # of a ratio that does not exist the place stays empty
+        values = [*point.doses.values(), *(group.get(inlet, "") for group in groups for inlet in first.exits)]
         table.writerow([*values, point.fed, point.cvd, search.cost(point)])
     write_atomically(directory / "points.csv", text.getvalue())

@@ -83,3 +83,19 @@ def pair_on_two_places() -> Mechanism:
         ),
         gas_reactions=(),
     )
+
+
+SITTING = """
+name = "sitting"
+[species.TMA]
+formula = "Al(CH3)3"
+molar_mass = "72.09 g/mol"
+[site.OH]
+[site."TMA*"]
+formula = "OHAl(CH3)3"
+[reaction.sits]
+equation = "OH + TMA <=> TMA*"
+A = "0.9 m/s"
+reverse = { A = "1e-4 mol/m^2/s" }
+"""
+"""TMA sits down on OH and comes off again, K = 9000 m3/mol."""

@@ -1,11 +1,15 @@
 """Reports and advice of mechanisms with any rate law: what has no number is left out, and sentences say what is so."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from mpm.advice.checks import check_case
+from mpm.advice.doses import doses_of
 from mpm.advice.heat import energy_report
 from mpm.case.case import Case
+from mpm.cli import main
 from mpm.mesh.grid import Grid
 from mpm.physics.mechanism import Mechanism
 from mpm.physics.rates import Arrhenius, Law
@@ -19,7 +23,7 @@ from mpm.report.records import State, Totals
 from mpm.report.verdict import growth_share, percent, verdict
 
 from .cases import TINY, zone
-from .general import law, mechanism, surface, with_mechanism
+from .general import SITTING, law, mechanism, surface, with_mechanism
 from .test_general_balances import book
 
 TMA = zone().mechanism.get("TMA")
@@ -141,3 +145,64 @@ def test_a_reaction_without_sites_has_no_rise() -> None:
     case = with_mechanism(hot, growing())
     assert energy_report(case, hot.energy)["bed"]["adiabatic_rise"] == {"growth": None}
     assert check_case(case)["energy"]["bed"].get("adiabatic_rise") == {}
+
+
+@pytest.fixture
+def sitting_file(tmp_path: Path) -> str:
+    path = tmp_path / "sitting.toml"
+    path.write_text(SITTING)
+    return str(path)
+
+
+@pytest.mark.parametrize("target", [0.5, 0.9])
+def test_a_search_starts_where_enough_stays(sitting_file: str, target: float) -> None:
+    """Fails when the first dose of a reversible precursor is not the leanest that leaves the target on the solids, K C/(1 + K C), and
+    feeds that share of what it leaves."""
+    case = zone({"chemistry.mechanism": sitting_file}, TINY)
+    (dose,) = doses_of(case, target, velocities=False)
+    at = case.with_({dose.key: dose.start})
+    inlet = next(i for i in at.geometry.inlets if i.doses)
+    concentration = 9000.0 * at.feed_concentrations(inlet.mass_fractions)["TMA"]
+    found = inlet_excess(at, inlet)
+    assert found is not None and found.dose_ratio is not None
+    reached = min(concentration / (1.0 + concentration) / target, found.dose_ratio / target)
+    assert 1.0 <= reached < 1.03
+
+
+def test_rates_and_orders_can_be_swept(sitting_file: str) -> None:
+    """Fails when a key of the way back, of an equilibrium or of an order cannot be changed by its dotted name."""
+    case = zone({"chemistry.mechanism": sitting_file}, TINY)
+    slow = case.with_({"chemistry.reaction.sits.reverse.A": "1e3 1/s"}).mechanism.surface_reactions[0]
+    assert (
+        slow.backward is not None
+        and slow.backward.constant == Arrhenius(1e3)
+        and slow.backward.per_site == 1.0
+    )
+    half = case.with_(
+        {"chemistry.reaction.sits.orders": {"TMA": 0.5}, "chemistry.reaction.sits.A": "1 m^-0.5*mol^0.5/s"}
+    )
+    assert half.mechanism.surface_reactions[0].forward.gas_orders == {"TMA": 0.5}
+    one = case.with_({"chemistry.reaction.sits.orders.OH": 2.0})
+    assert one.mechanism.surface_reactions[0].forward.site_orders == {"OH": 2.0}
+    given = case.with_({"chemistry.reaction.sits.equilibrium_constant": "3 m^3/mol"})
+    assert given.mechanism.surface_reactions[0].equilibrium == Arrhenius(3.0)
+
+
+def test_check_says_orders_and_endless_uptake(sitting_file: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when `mpm check` hides a way back, an order that is not 1, or that nothing saturates."""
+    settings = {
+        "chemistry.mechanism": sitting_file,
+        "chemistry.reaction.sits.orders": "{TMA = 2}",
+        "chemistry.reaction.sits.A": "1 m^4/mol/s",
+        "chemistry.film.F.formula": "Al(CH3)3",
+        "chemistry.reaction.grows.equation": "TMA + OH -> OH + F",
+        "chemistry.reaction.grows.A": "1 cm/s",
+    }
+    assert (
+        main(["check", "single_zone", *(part for k, v in settings.items() for part in ("--set", f"{k}={v}"))])
+        == 0
+    )
+    text = capsys.readouterr().out
+    assert "OH + TMA <=> TMA* (order 2 in TMA; back: order 2 in" not in text
+    assert "OH + TMA <=> TMA* (order 2 in TMA)" in text
+    assert "molecules per passing site, taken up without end" in text

@@ -163,6 +163,8 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
         return numbers
     species, numbers["excess_number"], numbers["dose_ratio"], saturated = found
     mechanism, material, k = case.mechanism, layer.material, saturated.speed
+    if saturated.endless:
+        numbers["endless"] = True
     molecular = material.pore_diffusivity(
         gas.diffusivity[species], mechanism.get(species).molar_mass, gas.temperature
     )

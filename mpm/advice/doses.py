@@ -17,6 +17,8 @@ VERB = "optimise"
 """What a message begins with."""
 RICHEST, LEANEST = 0.02, 1e-6
 """Mass fractions: dilute gas above, nothing happens below."""
+NEAR = 0.02
+"""Relative error of the mass fraction with which a search starts."""
 VELOCITIES = 5.0
 """Factor by which a port velocity may fall or rise."""
 
@@ -50,12 +52,14 @@ def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
         if excess.dose_ratio is None:
             found = f"inlet {inlet.name}, whose precursor {species} never saturates the surface"
             raise InputError.at(VERB, "", found, "reactions that end")
-        fraction = inlet.mass_fractions[species] * target / excess.dose_ratio
         key = f"geometry.inlet.{inlet.name}"
+        dosed = f"{key}.mass_fractions.{species}"
+        if case.mechanism.is_first_order:
+            fraction = inlet.mass_fractions[species] * target / excess.dose_ratio
+        else:
+            fraction = _least_enough(case, inlet, dosed, target)
         start = min(max(fraction, 2.0 * LEANEST), 0.5 * RICHEST)
-        doses.append(
-            Dose(key=f"{key}.mass_fractions.{species}", start=start, lowest=LEANEST, highest=RICHEST)
-        )
+        doses.append(Dose(key=dosed, start=start, lowest=LEANEST, highest=RICHEST))
         if velocities:
             doses.append(
                 Dose(
@@ -75,6 +79,29 @@ def doses_of(case: Case, target: float, velocities: bool) -> list[Dose]:
             found = "no inlet that feeds a precursor of the surface reactions"
         raise InputError.at(VERB, "", found, "a bed that moves past one inlet or more that dose it")
     return doses
+
+
+def _least_enough(case: Case, inlet: Inlet, key: str, target: float) -> float:
+    """The smallest mass fraction whose dose ratio is `target` and which alone leaves that share of the sites titrated; else the richest.
+
+    Where reactions go back, what stays on the solids depends on the concentration: one that is low leaves little, however long it flows.
+    """
+
+    def enough(fraction: float) -> bool:
+        changed = case.with_({key: fraction})
+        found = inlet_excess(changed, next(i for i in changed.geometry.inlets if i.name == inlet.name))
+        if found is None or found.dose_ratio is None or found.dose_ratio < target:
+            return False
+        covered = sum(
+            found.saturation.left.get(site, 0.0) for site in case.mechanism.titrated_sites(found.species)
+        )
+        return covered >= target
+
+    low, high = math.log(LEANEST), math.log(RICHEST)
+    while high - low > NEAR:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if enough(math.exp(middle)) else (middle, high)
+    return math.exp(high)
 
 
 def checked_doses(case: Case, target: float, weight: float, velocities: bool, limit: int) -> list[Dose]:

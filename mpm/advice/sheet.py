@@ -11,6 +11,7 @@ from mpm.advice.heatsheet import heat_numbers, temperature_rows
 from mpm.case.case import Case
 from mpm.case.marks import Marked, value_text
 from mpm.case.ports import Inlet
+from mpm.report.rateunits import peculiar_orders
 from mpm.screen import Listing, Sheet, number, together
 
 
@@ -125,10 +126,12 @@ def _gas(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> No
         alike.setdefault(text, []).append(species)
     for text, names in alike.items():
         sheet.add("diffusivity" if len(alike) == 1 else f"diffusivity of {', '.join(names)}", text)
-    for index, reaction in enumerate(report["reactions"]):
+    for index, reaction in enumerate(case.mechanism.reactions):
         mark = marked.mark("chemistry.mechanism")
         label = f"mechanism {case.chemistry.mechanism}{mark}" if index == 0 else ""
-        sheet.add(label or "and", re.sub(r"(?<=\b\d) (?=\S)", "\u00a0", reaction))
+        odd = peculiar_orders(reaction)
+        text = f"{reaction} ({odd})" if odd else str(reaction)
+        sheet.add(label or "and", re.sub(r"(?<=\b\d) (?=\S)", "\u00a0", text))
 
 
 def _ports(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> None:
@@ -163,6 +166,8 @@ def _feed(sheet: Sheet, case: Case, inlet: Inlet, numbers: dict[str, Any], marke
         ratio = (
             f", {number(numbers['dose_ratio'], digits=3)} times what saturates"
             if "dose_ratio" in numbers
+            else ", taken up without end"
+            if "endless" in numbers
             else ""
         )
         sheet.add(

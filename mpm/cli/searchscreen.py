@@ -58,20 +58,32 @@ def print_found(search: Search, directory: Path, console: Console) -> None:
         ]
         say(
             console,
-            f"{inlet}: {', '.join(doses)}: dose ratio {best.ratios[inlet]:.4g} ({best.excess[inlet]:.4g} molecules per site), "
-            f"coverage at the exit {best.exits[inlet]:.4f}",
+            f"{inlet}: {', '.join(doses)}: {_dose(best, inlet)}, coverage at the exit {best.exits[inlet]:.4f}",
             2,
         )
     fed = quantity("species.X.fed", steady=True)
     say(
         console,
         f"Precursor fed {number(fed.of(best.fed), fed.unit_shown)}, {100.0 * (best.fed / search.points[0].fed - 1.0):+.2g} % against the "
-        f"start, where every dose ratio is the target; parasitic CVD {_cvd(best)}.",
+        f"start, where {_start(search)}; parasitic CVD {_cvd(best)}.",
         2,
     )
     console.print()
     say(console, f"Results: {directory}: case.toml (the case with these doses), points.csv, plots/search.png")
     print_steps([(f"mpm run {name}/case.toml -o {name}/run", "the case with these doses")], console)
+
+
+def _start(search: Search) -> str:
+    """What the first doses are."""
+    if search.case.mechanism.is_first_order:
+        return "every dose ratio is the target"
+    return "each feed by itself would just reach the target"
+
+
+def _dose(point: Point, inlet: str) -> str:
+    """What an inlet feeds, by saturation and by sites; the former may not exist at these doses."""
+    feeds = f"{point.excess[inlet]:.4g} molecules per site"
+    return f"dose ratio {point.ratios[inlet]:.4g} ({feeds})" if inlet in point.ratios else feeds
 
 
 def _reached(search: Search, point: Point) -> str:
@@ -99,13 +111,15 @@ def draw_search(directory: Path, search: Search) -> Path:
 def search_figure(search: Search) -> Figure:
     """The path of the search: for each inlet the coverage at its exit and the CVD over its dose ratio, in the order of the steady states.
 
-    The slanting line is a zone that takes up everything: its coverage is the dose ratio.
+    The slanting line is a zone that takes up everything: its coverage is the dose ratio. Where the reactions are such that what saturation
+    needs depends on the dose, they are shown over the molecules fed per site, without that line.
     """
     from matplotlib.figure import Figure
 
     from mpm.labels import literal
 
     inlets, points, best = list(search.points[0].exits), search.points, search.best()
+    counted = search.case.mechanism.is_first_order
     figure = Figure(figsize=(1.2 + 4.2 * len(inlets), 6.6), layout="constrained")
     title = search.case.title or "search"
     figure.suptitle(literal(f"{title}: doses that cover {search.target:g} of the sites"), fontsize=11)
@@ -115,7 +129,7 @@ def search_figure(search: Search) -> Figure:
     power = 3 * math.floor(math.log10(most) / 3.0) if most > 0.0 else 0
     order = list(range(1, len(points) + 1))
     for (upper, lower), inlet in zip(grid.T, inlets, strict=True):
-        ratios = [p.ratios[inlet] for p in points]
+        ratios = [(p.ratios if counted else p.excess)[inlet] for p in points]
         span = sorted({min(ratios), min(max(min(ratios), 1.0), max(ratios)), max(ratios)})
         for axes, values in (
             (upper, [p.exits[inlet] for p in points]),
@@ -129,10 +143,13 @@ def search_figure(search: Search) -> Figure:
                 at = points.index(best)
                 axes.plot(ratios[at], values[at], "*", color="#d55e00", ms=13, zorder=3, label="best")
             axes.grid(alpha=0.25)
-        upper.plot(span, [min(r, 1.0) for r in span], ":", color="0.4", label="everything is taken up")
+        if counted:
+            upper.plot(span, [min(r, 1.0) for r in span], ":", color="0.4", label="everything is taken up")
         upper.axhline(search.target, color="k", ls="--", lw=1.0, label=f"target {search.target:g}")
         upper.set_title(literal(inlet), fontsize=10)
-        lower.set_xlabel("dose ratio: fed over what saturation needs")
+        lower.set_xlabel(
+            "dose ratio: fed over what saturation needs" if counted else "molecules fed per passing site"
+        )
     grid[0, 0].set_ylabel("coverage at the exit, mean")
     grid[1, 0].set_ylabel(f"parasitic CVD [{f'$10^{{{power}}}$ ' if power else ''}{cvd.unit_shown}]")
     figure.colorbar(dots, ax=grid[:, -1], label="steady state, in the order of the search", aspect=40)

@@ -62,9 +62,7 @@ def write_mechanism(case: Case, path: Path) -> None:
             path, "", "a file that is there already", "a new one: mpm mechanism writes over nothing"
         )
     tables = case.chemistry.model_dump(mode="json", by_alias=True, exclude_none=True)
-    kept = {
-        key: value for key, value in tables.items() if key in ("name", "species", "site", "film", "reaction")
-    }
+    kept = {key: value for key, value in tables.items() if key not in ("mechanism", "phase", "gas_reactions")}
     try:
         write_atomically(path, write_toml(kept))
     except OSError as error:

@@ -28,13 +28,16 @@ class Saturation:
 
     `speed` [m/s] at which it is taken up at first, flux over concentration; `need`: molecules per place until nothing changes any more,
     None where that never comes, as with growth that does not stop and with catalysis; `lifetime` [s] of the sites, in which of what it
-    takes all but 1/e has been taken; of the kind that it turns over last where several do, each by itself.
+    takes all but 1/e has been taken; of the kind that it turns over last where several do, each by itself. `left` is the coverage in the
+    end; `endless`: whether the precursor is taken up without end, as far as that has been followed.
     """
 
     met: Mapping[str, float]
     speed: float
     need: float | None
     lifetime: float | None
+    left: Mapping[str, float]
+    endless: bool = False
 
 
 def saturation(
@@ -59,7 +62,8 @@ def saturation(
         per_site = slowest_turnover(mechanism, species, met, temperature) * gas[species]
         lifetime = site_density / per_site if per_site > 0.0 else None
     need = molecules_per_site(mechanism, species, fresh, temperature)
-    return Saturation(met, speed, need or None, lifetime)
+    after = saturate(mechanism, species, met, temperature) if met else None
+    return Saturation(met, speed, need or None, lifetime, met if after is None else after[0])
 
 
 def _saturation_in_time(
@@ -73,11 +77,18 @@ def _saturation_in_time(
 ) -> Saturation:
     met, after = _met(mechanism, species, gas, fresh, temperature, site_density, others)
     if after is None:
-        return Saturation({}, 0.0, None, None)
+        return Saturation({}, 0.0, None, None, {})
     rates = SurfaceRates(mechanism, gas, temperature, site_density)
     flux = site_density * rates.taken(met)[species]
-    need = None if species in after.endless else after.taken[species]
-    return Saturation(met, max(flux, 0.0) / gas[species], need, after.time(species, 1.0 - math.exp(-1.0)))
+    endless = species in after.endless
+    return Saturation(
+        met,
+        speed=max(flux, 0.0) / gas[species],
+        need=None if endless else after.taken[species],
+        lifetime=after.time(species, 1.0 - math.exp(-1.0)),
+        left=after.coverage,
+        endless=endless,
+    )
 
 
 def _met(

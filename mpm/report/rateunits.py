@@ -9,44 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from mpm.case.ratetables import unit_text
+from mpm.case.rateunits import Orders
 from mpm.physics.mechanism import Mechanism
 from mpm.physics.rates import Law
 from mpm.physics.reaction import Reaction, SurfaceReaction
 
-WHOLE = 1e-9
-"""Difference of a power from a whole number that is rounding."""
 
-
-def unit(mol: float, metre: float, second: float = 0.0) -> str:
-    """A product of powers as people write it: `m^3/mol/s`, `1/s`, empty without any."""
-    powers = [
-        (name, power) for name, power in (("mol", mol), ("m", metre), ("s", second)) if abs(power) > WHOLE
-    ]
-    above = " ".join(_power(name, power) for name, power in powers if power > 0.0)
-    below = "".join(f"/{_power(name, -power)}" for name, power in powers if power < 0.0)
-    return above + below if above else f"1{below}" if below else ""
-
-
-def _power(name: str, power: float) -> str:
-    return name if abs(power - 1.0) < WHOLE else f"{name}^{power:.4g}"
-
-
-def unit_per_area(law: Law, on_surface: bool) -> str:
-    """Of the constant of one way of a reaction, coverages as shares; in the gas there is no other."""
-    gases = sum(law.gas_orders.values())
-    return unit(1.0 - gases, 3.0 * gases - (2.0 if on_surface else 3.0), -1.0)
-
-
-def unit_per_site(law: Law) -> str:
-    """The same with amounts per area in place of shares."""
-    gases, sites = sum(law.gas_orders.values()), sum(law.site_orders.values())
-    return unit(1.0 - gases - sites, 3.0 * gases - 2.0 + 2.0 * sites, -1.0)
+def units_of(law: Law, on_surface: bool) -> tuple[str, str]:
+    """Of the constant of one way of a reaction, coverages as shares, and per site; in the gas both are one."""
+    orders = Orders(law.gas_orders, law.site_orders, on_surface)
+    return unit_text(orders.of_shares), unit_text(orders.per_site if on_surface else orders.of_shares)
 
 
 def unit_of_equilibrium(reaction: Reaction) -> str:
     """Of K in concentrations and coverages."""
     gases = sum(reaction.nu_gas.values())
-    return unit(gases, -3.0 * gases)
+    return unit_text({"mol": gases, "m": -3.0 * gases, "s": 0.0})
 
 
 def rate_constants(
@@ -58,17 +37,18 @@ def rate_constants(
     constants = mechanism.rate_constants(reaction, temperature, site_density)
     for value, law in zip(constants, reaction.laws, strict=False):
         if not isinstance(reaction, SurfaceReaction):
-            found.append({"in_gas": float(value), "in_gas_unit": unit_per_area(law, on_surface=False)})
+            found.append({"in_gas": float(value), "in_gas_unit": units_of(law, on_surface=False)[0]})
             continue
+        per_area, per_site = units_of(law, on_surface=True)
         density = 1.0
         for name, order in law.site_orders.items():
             density *= (site_density / places[name]) ** order
         found.append(
             {
                 "per_area": float(value),
-                "per_area_unit": unit_per_area(law, on_surface=True),
+                "per_area_unit": per_area,
                 "per_site": float(value) / density,
-                "per_site_unit": unit_per_site(law),
+                "per_site_unit": per_site,
             }
         )
     return found
@@ -77,16 +57,6 @@ def rate_constants(
 def orders(law: Law) -> Mapping[str, float]:
     """Of gases and sites."""
     return {**law.gas_orders, **law.site_orders}
-
-
-def orders_in_words(law: Law) -> str:
-    """`order 1 in TMA and OH, 0.5 in *`; `order 0` where nothing sets the rate."""
-    by_order: dict[float, list[str]] = {}
-    for name, order in orders(law).items():
-        by_order.setdefault(order, []).append(name)
-    if not by_order:
-        return "order 0"
-    return "order " + ", ".join(f"{order:g} in {' and '.join(names)}" for order, names in by_order.items())
 
 
 def peculiar_orders(reaction: Reaction) -> str:
