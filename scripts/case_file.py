@@ -66,6 +66,63 @@ conductivity_model = "zehner_bauer_schluender"
   Dispersion by vibration (`transport.vibrational_dispersion`) is that of species, not of heat.
 * `material.NAME.pore_diameter`, with temperature or without: gas that is thin enough slips at the walls of the pores, K (1 + 8 l/d), and
   meets them as often as other molecules, 1/D = 1/D_m + 1/D_K. In wide pores nothing changes.
+
+## Reactions
+
+A mechanism is a file of species, sites, films and reactions, or these tables in the case itself:
+
+```toml
+[geometry]
+base = "single_zone"
+
+[chemistry]
+mechanism = "inline"
+
+[chemistry.species.H2O]
+molar_mass = "18.02 g/mol"
+
+[chemistry.species.O2]
+molar_mass = "32.00 g/mol"
+
+[chemistry.site."*"]                 # the first is the fresh surface; a star is a place, which has no atoms
+
+[chemistry.site."H2O*"]
+
+[chemistry.site.O2bridge]            # holds two places
+formula = "O2"
+sites = 2
+
+[chemistry.reaction.water]           # both ways, by two constants; or equilibrium_constant = "0.5 m^3/mol", or from enthalpy and entropy
+equation = "H2O + * <=> H2O*"
+sticking = 0.01
+reverse = { A = "1e13 1/s", Ea = "80 kJ/mol" }
+coverage = { "H2O*" = { E = "5 kJ/mol" } }
+
+[chemistry.reaction.oxygen]
+equation = "O2 + 2 * -> O2bridge"
+A = "0.2 m/s"
+orders = { "*" = 2 }
+
+[[geometry.inlet]]
+name = "tma"
+mass_fractions = { H2O = 1e-4 }
+```
+
+* `->` goes one way, `<=>` both. Elements and the number of places on the surface must balance. A site on both sides is a surface that
+  stays: growth that does not end, or a catalyst. A film on the left is as thick as needed and does not slow a reaction.
+* r = k ∏ C^η ∏ θ^μ, in mol of events per m² of surface and s, or per m³ of gas: C in mol/m³, θ the share of places. One way the orders
+  are 1 in each reactant whatever its coefficient; both ways they are the coefficients, for only then both rest at one equilibrium.
+  `orders` says otherwise (0 to 4, also of gases and sites that are no reactants); the way back of an equilibrium then changes by as much.
+* The unit of `A` follows from the orders, and says what is meant. Of shares: `m/s` for one gas, `mol/m^2/s` for none. Per site, as
+  Chemkin and Cantera mean it: `1/s` for a site alone, `m^2/mol/s` for two, `m^3/mol/s` for a gas and a site; it meets the material's own
+  `site_density`. In the gas `1/s`, `m^3/mol/s`, `m^6/mol^2/s`; orders that are no integers have such units, `m^2.5/mol^0.5/s`.
+* A way back without a constant follows from `enthalpy` and `entropy` (298.15 K) or `nasa` polynomials of all that the reaction changes,
+  gases at `reference_pressure` (1 bar): K = exp(-ΔG/RT) (p0/RT)^Δn.
+* `mechanism = "ptcombust.yaml"` is a file in Cantera's format, beside the case or one that Cantera has (`pip install 'mpm[chemistry]'`),
+  with its `phase`. What takes part in its reactions is taken over, the site with the largest coverage in the phase's state first;
+  constants per site meet the material's `site_density`, which should be the file's. Reactions are called after their `id`, else R1, R2
+  ... and those in the gas G1, G2 ... in the order of the file; `gas_reactions = false` leaves these out. What has no counterpart here
+  (falloff, M, Blowers-Masel, charges, polynomials of coverage) is refused by name.
 """
 
 

@@ -6,7 +6,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 target=${1:-.venv}
 requirements=${2-requirements.lock}
-extras=fem,dem,sweep,view,dev
+extras=fem,chemistry,dem,sweep,view,dev
 
 stop() {
     printf 'make venv: %s\n' "$*" >&2

@@ -1,6 +1,9 @@
 """General reactions in a mechanism: what their tables mean, in units of shares and per site, both ways, overridden key by key."""
 
 import math
+import re
+import tomllib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -233,3 +236,13 @@ def test_polynomials_and_numbers_replace_each_other() -> None:
     back = load_case(case.to_dict(), {"chemistry.species.H2O.entropy": "190 J/mol/K"})
     assert back.mechanism.species[0].nasa is None and back.mechanism.species[0].entropy == 190.0
     assert load_case(case.to_dict()) == case
+
+
+def test_the_example_of_the_documents_is_valid() -> None:
+    """Fails when what docs/case_file.md shows of reactions is refused, or is of other orders than its text says."""
+    text = (Path(__file__).parents[1] / "docs" / "case_file.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"^```toml\n([^`]*chemistry.species[^`]*)^```", text, re.MULTILINE)
+    mechanism = load_case(tomllib.loads(example)).mechanism
+    water, oxygen = mechanism.surface_reactions
+    assert water.backward is not None and water.backward.per_site == 1.0
+    assert dict(oxygen.forward.site_orders) == {"*": 2.0} and list(mechanism.places) == [1.0, 1.0, 2.0]

@@ -10,9 +10,9 @@ for instance `chemistry.reaction.tma.sticking = 0.1`; `mechanism = "inline"` sta
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from mpm.case.model import Flag
 from mpm.case.ratetables import Coverages, Equilibrium, MechanismTable, RateConstant, Reverse
@@ -186,7 +186,12 @@ class Chemistry(MechanismTable):
     """The `[chemistry]` table, with the mechanism's own tables merged in: complete in itself."""
 
     mechanism: str = "alumina"
-    """the reactions: the name of a built-in mechanism, the path of a mechanism file, or inline (all of it in this table)"""
+    """the reactions: the name of a built-in mechanism, the path of a mechanism file, or inline (all of it in this table); also a file of
+    Cantera (NAME.yaml: a path, or one that Cantera has)"""
+    phase: str = Field("", examples=["Pt_surf"])
+    """which phase of a file of Cantera holds the reactions; left out, the only surface in it"""
+    gas_reactions: Flag = True
+    """whether reactions of the gas beside the surface in a file of Cantera are taken over too"""
     reference_pressure: Pressure = REFERENCE_PRESSURE
     """pressure at which the entropies of gases are given"""
     name: str = worked_out("the mechanism's file name", "", example="alumina")
@@ -199,6 +204,18 @@ class Chemistry(MechanismTable):
     """solid products, by name"""
     reaction: dict[str, ReactionTable] = Field({})
     """reactions, by name; keys given here lie over the mechanism's, e.g. chemistry.reaction.tma.sticking = 0.1"""
+
+    @model_validator(mode="after")
+    def _of_cantera(self) -> Self:
+        """What only a file of Cantera reads is gone by now where there is one."""
+        for key, given in (("phase", bool(self.phase)), ("gas_reactions", not self.gas_reactions)):
+            if given:
+                raise reject(
+                    f"{key} beside a mechanism that is no file of Cantera",
+                    f'no {key}, or a mechanism = "NAME.yaml"',
+                    key=key,
+                )
+        return self
 
 
 def drop_heats(tables: dict[str, Any], kept: Collection[str] = ()) -> None:

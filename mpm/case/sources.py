@@ -15,6 +15,7 @@ from typing import Any
 
 import tomli_w
 
+from mpm.case.cantera_file import cantera_tables, is_cantera
 from mpm.case.materials import BUILT_IN
 from mpm.case.merging import Table, replaced
 from mpm.case.merging import merge as merge  # offered here too
@@ -25,6 +26,10 @@ from mpm.errors import InputError
 from mpm.files import is_file, read_text
 from mpm.spelling import quotes_advice
 
+_OF_MECHANISM = ("chemistry.mechanism", "chemistry.phase", "chemistry.gas_reactions")
+_KEYS = ("mechanism", "phase", "gas_reactions")
+_SOURCES = ("geometry.base", *_OF_MECHANISM)
+"""Keys that name what the other tables lie over."""
 DEEPEST = 30
 """Levels of tables and lists in a file; a case needs five."""
 
@@ -145,18 +150,21 @@ def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path
     left as they are: validation, which comes next, says so.
     """
     result: Table = deepcopy(dict(data))
-    for key in ("geometry.base", "chemistry.mechanism"):  # these decide what the other keys refer to
+    for key in _SOURCES:  # these decide what the other keys refer to
         if key in overrides:
             set_key(result, key, overrides[key], source)
     if "geometry" in result:
         result["geometry"] = _with_base(result["geometry"], folder, source)
-    _insert_mechanism(result, folder, source)
+    _insert_mechanism(
+        result, folder, source, "energy" in result or any(_is_below(k, "energy") for k in overrides)
+    )
     _spread_equilibria(result)
     gas = result.setdefault("gas", {})
     if isinstance(gas, dict) and not isinstance(gas.get("diffusivity", {}), dict):
         gas["diffusivity"] = {"default": gas["diffusivity"]}
     for key, value in overrides.items():
-        set_key(result, key, value, source, overrides)
+        if key not in _OF_MECHANISM:  # its tables are all there by now
+            set_key(result, key, value, source, overrides)
     _insert_materials(result, source)
     _spread_diffusivity(result)
     profile = _table(result, "motion").get("profile", "thesis")
@@ -196,14 +204,33 @@ def mechanism_tables(
     data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path, source: str
 ) -> Table:
     """The tables of the mechanism that a case names, alone; empty for an inline one."""
-    name = overrides.get("chemistry.mechanism", _table(data, "chemistry").get("mechanism", "alumina"))
+    chemistry = mechanism_source(data, overrides)
+    name = chemistry["mechanism"]
+    if is_cantera(name):
+        return cantera_tables(chemistry, folder, source, heats=True)
     return {} if name == "inline" else read_toml(find_file("mechanisms", name, folder, source, ""))
 
 
-def _insert_mechanism(data: Table, folder: Path, source: str) -> None:
+def mechanism_source(data: Mapping[str, Any], overrides: Mapping[str, Any]) -> Table:
+    """What says where a case's mechanism comes from: `mechanism`, and of a file of Cantera `phase` and `gas_reactions`."""
+    said = {key.rpartition(".")[2]: overrides[key] for key in _OF_MECHANISM if key in overrides}
+    chemistry = _table(data, "chemistry")
+    return {"mechanism": "alumina", **{key: chemistry[key] for key in _KEYS if key in chemistry}, **said}
+
+
+def _is_below(key: str, table: str) -> bool:
+    return key == table or key.startswith(f"{table}.")
+
+
+def _insert_mechanism(data: Table, folder: Path, source: str, heats: bool) -> None:
     chemistry = data.setdefault("chemistry", {})
     name = chemistry.setdefault("mechanism", "alumina") if isinstance(chemistry, dict) else None
     if not isinstance(name, str) or name == "inline":
+        return
+    if is_cantera(name):
+        tables = cantera_tables(mechanism_source(data, {}), folder, source, heats)
+        own = {key: value for key, value in chemistry.items() if key not in _KEYS}
+        data["chemistry"] = {**merge({"name": Path(name).stem, **tables}, own), "mechanism": "inline"}
         return
     path = find_file("mechanisms", name, folder, source, "chemistry.mechanism")
     data["chemistry"] = merge({"name": path.stem, **read_toml(path)}, chemistry)

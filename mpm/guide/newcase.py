@@ -99,6 +99,8 @@ class _Writer:
         for key in (key for key in keys if not key.is_table):
             yield from self.line(key, (*path, key.last), described, shown)
         for key in (key for key in keys if key.is_table):
+            if not described and not self.is_active((*path, key.last)):
+                continue  # shown at the first entry
             yield ""
             yield from _comment(key.description, "## ")
             if key.entries:

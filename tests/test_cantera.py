@@ -1,0 +1,280 @@
+"""Mechanisms in Cantera's YAML against Cantera itself: rates of progress, what is refused, what a resolved case keeps."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mpm.case.case import Case, load_case
+from mpm.cli import main
+from mpm.errors import InputError
+from mpm.physics.rates import Law
+
+ct = pytest.importorskip("cantera", reason="the extra chemistry is not installed")
+R = 8.31446261815324
+SURFACES = [
+    ("ptcombust.yaml", "Pt_surf", (500.0, 900.0, 1400.0)),
+    ("methane_pox_on_pt.yaml", "Pt_surf", (400.0, 900.0, 1400.0)),
+    (
+        "diamond.yaml",
+        "diamond_100",
+        (600.0, 1200.0),
+    ),  # reversible, with a film, from enthalpies and entropies
+    ("SiF4_NH3_mec.yaml", "SI3N4", (1000.0, 1713.0)),  # species that hold two and four places
+    ("sofc.yaml", "metal_surface", (800.0, 1100.0)),  # sticking coefficients of reversible reactions
+]
+
+
+def case_of(mechanism: str, temperature: float = 900.0, **chemistry: Any) -> Case:
+    layer = [{"name": "gas", "height": "1 mm", "cells": 2}]
+    return load_case(
+        {
+            "geometry": {"length": "10 mm", "cell_width": "1 mm", "layer": layer},
+            "chemistry": {"mechanism": mechanism, "gas_reactions": False, **chemistry},
+            "gas": {"carrier": "He", "temperature": f"{temperature} K"},
+        }
+    )
+
+
+def progress(case: Case, amounts: dict[str, float], T: float, site_density: float) -> np.ndarray:
+    """Rates of progress (reactions, 2) there and back as `mpm.physics.rates` defines them, in the order of the file."""
+    found = []
+    for reaction in case.mechanism.reactions:
+        constants = case.mechanism.rate_constants(reaction, T, site_density)
+        ways = [float(k) * product(law, amounts, T) for k, law in zip(constants, reaction.laws, strict=False)]
+        found.append([*ways, 0.0][:2])
+    return np.array(found)
+
+
+def product(law: Law, amounts: dict[str, float], T: float) -> float:
+    value = math.prod(amounts[name] ** order for name, order in {**law.gas_orders, **law.site_orders}.items())
+    for name, of in law.coverage.items():
+        theta = amounts[name]
+        value *= 10.0 ** (of.a * theta) * theta**of.m * math.exp(-of.E * theta / (R * T))
+    return value
+
+
+@pytest.mark.parametrize(("file", "phase", "temperatures"), SURFACES, ids=lambda value: str(value)[:12])
+def test_rates_of_progress_are_canteras(file: str, phase: str, temperatures: tuple[float, ...]) -> None:
+    """To 1e-10 of each reaction's gross rate, at random compositions, pressures and coverages. Fails when a unit, an order, a sticking
+    coefficient, a dependence on coverage, an equilibrium or the size of a species is taken for another."""
+    surface = ct.Interface(file, phase)
+    gas = next(beside for beside in surface.adjacent.values() if beside.thermo_model == "ideal-gas")
+    case = case_of(file, max(temperatures), phase=phase)
+    assert len(case.mechanism.reactions) == surface.n_reactions
+    random = np.random.default_rng(16)
+    for T in temperatures:
+        for pressure in (2e3, ct.one_atm):
+            gas.TPX = T, pressure, random.dirichlet(np.ones(gas.n_species))
+            for beside in surface.adjacent.values():
+                beside.TP = T, ct.one_atm if beside is not gas else pressure
+            surface.TP = T, ct.one_atm
+            surface.coverages = random.dirichlet(0.3 * np.ones(surface.n_species))
+            amounts = {
+                **dict(zip(gas.species_names, gas.concentrations * 1e3, strict=True)),
+                **dict(zip(surface.species_names, surface.coverages, strict=True)),
+            }
+            ours = progress(case, amounts, T, surface.site_density * 1e3)
+            theirs = (
+                np.stack([surface.forward_rates_of_progress, surface.reverse_rates_of_progress], axis=1) * 1e3
+            )
+            gross = theirs.sum(axis=1, keepdims=True)
+            assert (np.abs(ours - theirs) <= 1e-10 * gross).all(), surface.reaction_equations()
+
+
+GAS = """
+phases:
+- name: gas
+  thermo: ideal-gas
+  species: [{gri30.yaml/species: [H2, H, O2, O, OH, H2O, N2]}]
+  kinetics: gas
+  reactions: all
+  state: {T: 1000.0, P: 1 atm}
+reactions:
+- {equation: O + H2 <=> H + OH, id: exchange, rate-constant: {A: 3.87e+04 cm^3/mol/s, b: 2.7, Ea: 6260.0 cal/mol}}
+- {equation: 2 OH <=> O + H2O, rate-constant: {A: 3.57e+04 cm^3/mol/s, b: 2.4, Ea: -2110.0 cal/mol}}
+- {equation: H2O => H + OH, rate-constant: {A: 1.0e+6 1/s, b: 0.0, Ea: 100.0 kJ/mol}}
+- {equation: 2 H + O2 => H2O + O, rate-constant: {A: 1.0e+6 m^6/kmol^2/s, b: 0.0, Ea: 0}}
+- {equation: 2 H + H2 <=> 2 H2, rate-constant: {A: 9.0e+16 cm^6/mol^2/s, b: -0.6, Ea: 0.0}}
+- {equation: H + OH + O2 <=> H2O + O2, rate-constant: {A: 9.0e+16 cm^6/mol^2/s, b: -0.6, Ea: 0.0}}
+"""
+
+
+def test_reactions_of_a_gas_alone_are_canteras(tmp_path: Path) -> None:
+    """Of one, two and three molecules, both ways, to 1e-10. Fails when kmol are taken for mol, or mass action for orders of 1."""
+    (tmp_path / "gas.yaml").write_text(GAS)
+    gas = ct.Solution(str(tmp_path / "gas.yaml"), "gas")
+    case = case_of(str(tmp_path / "gas.yaml"), phase="gas")
+    assert any(reaction.third_body for reaction in gas.reactions())  # Cantera keeps partners apart
+    assert "N2" not in case.mechanism.species_names  # in no reaction
+    assert [reaction.key for reaction in case.mechanism.reactions] == [
+        "exchange",
+        "G2",
+        "G3",
+        "G4",
+        "G5",
+        "G6",
+    ]
+    random = np.random.default_rng(3)
+    for T in (500.0, 1500.0):
+        gas.TPX = T, ct.one_atm, random.dirichlet(np.ones(gas.n_species))
+        amounts = dict(zip(gas.species_names, gas.concentrations * 1e3, strict=True))
+        theirs = np.stack([gas.forward_rates_of_progress, gas.reverse_rates_of_progress], axis=1) * 1e3
+        assert progress(case, amounts, T, 1.0) == pytest.approx(theirs, rel=1e-10)
+
+
+def test_heats_are_canteras() -> None:
+    """Enthalpies of reaction by the polynomials, J/mol. Fails when a range of temperature or a coefficient is another's."""
+    surface = ct.Interface("ptcombust.yaml", "Pt_surf")
+    case = load_case(
+        case_of("ptcombust.yaml").origin.data,
+        {"energy": {}, "gas.heat_capacity": "5193 J/kg/K", "gas.conductivity": "0.15 W/m/K"},
+    )
+    for T in (400.0, 900.0, 1200.0):
+        surface.adjacent["gas"].TP = T, ct.one_atm
+        surface.TP = T, ct.one_atm
+        ours = [float(case.mechanism.heat_of_reaction(r, T)) for r in case.mechanism.reactions]
+        assert ours == pytest.approx(surface.delta_enthalpy * 1e-3, rel=1e-10, abs=1e-6)
+
+
+def test_a_resolved_case_is_complete_in_toml() -> None:
+    """Fails when it names the file, forgets what an equilibrium needs, or keeps polynomials that nothing reads."""
+    case = case_of("ptcombust.yaml")
+    tables = case.to_dict()["chemistry"]
+    assert tables["mechanism"] == "inline" and tables["name"] == "ptcombust" and "phase" not in tables
+    with_polynomials = {
+        name for kind in ("species", "site") for name, table in tables[kind].items() if "nasa" in table
+    }
+    assert with_polynomials == {"H(S)", "O(S)", "OH(S)", "PT(S)", "H2O(S)"}  # of reactions 12, 13 and 14
+    assert load_case(case.to_dict()) == case
+    assert case.mechanism.site_names[0] == "PT(S)"
+    assert case_of("methane_pox_on_pt.yaml").mechanism.site_names[:2] == (
+        "H(S)",
+        "PT(S)",
+    )  # 0.99 covered in its state
+    film = case_of("diamond.yaml", 1200.0).mechanism.films[0]
+    assert film.name == "C(d)" and film.density == pytest.approx(3520.0)
+    assert film.molar_mass == pytest.approx(0.012011)
+
+
+def test_single_numbers_can_be_set() -> None:
+    """Fails when keys of a reaction of the file, or which file it is, cannot be overridden."""
+    case = case_of("ptcombust.yaml")
+    changed = case.with_({"chemistry.reaction.R5.sticking": 0.5, "chemistry.reaction.R5.motz_wise": True})
+    (five,) = (r for r in changed.mechanism.surface_reactions if r.key == "R5")
+    assert float(five.rate_constant(900.0)) == pytest.approx(
+        0.5 / 0.75 * math.sqrt(R * 900.0 / (2 * math.pi * 31.998e-3))
+    )
+    other = case.with_({"chemistry.mechanism": "sofc.yaml", "chemistry.phase": "metal_surface"})
+    assert other.mechanism.site_names[0] == "(m)"
+    assert load_case(other.to_dict()) == other
+
+
+SURFACE = """
+phases:
+- name: gas
+  thermo: ideal-gas
+  species: [{{gri30.yaml/species: [H2, O2, H2O, AR]}}]
+- name: solid
+  thermo: {solid}
+  species: [{solid_species}]
+- name: s
+  thermo: ideal-surface
+  species: [{{ptcombust.yaml/species: [PT(S), H(S), O(S)]}}]
+  kinetics: surface
+  reactions: all
+  site-density: 2.7e-9 mol/cm^2
+  adjacent-phases: [gas, solid]
+species:
+- {{name: B, composition: {{Pt: 1}}, thermo: {{model: constant-cp}}, equation-of-state: {{model: constant-volume, density: 21 g/cm^3}}}}
+- {{name: C, composition: {{Pt: 1}}, thermo: {{model: constant-cp}}, equation-of-state: {{model: constant-volume, density: 21 g/cm^3}}}}
+reactions:
+- {reaction}
+"""
+CARRIED = "H2 + 2 PT(S) => 2 H(S)"
+
+
+@pytest.mark.parametrize(
+    ("reaction", "line"),
+    [
+        (
+            "{equation: H2 + 2 PT(S) => 2 H(S), type: Blowers-Masel, rate-constant: {A: 1 m^5/mol^2/s, b: 0, Ea0: 0, w: 1 kJ/mol}}",
+            "mechanism: found reaction 1 of s, 'H2 + 2 PT(S) => 2 H(S)', of type interface-Blowers-Masel; accepted: elementary",
+        ),
+        (
+            "{equation: H2 + 2 PT(S) => 2 H(S), rate-constant: {A: 1 m^5/mol^2/s, b: 0, Ea: 0}, "
+            "coverage-dependencies: {H(S): {a: 0, m: 0, E: [1.0e3, 2.0e3, 0, 0]}}}",
+            "whose activation energy is a polynomial of the coverage of H(S)",
+        ),
+        (
+            "{equation: H2 + 2 PT(S) => 2 H(S), orders: {PT(S): -0.5}, negative-orders: true, "
+            "rate-constant: {A: 1, b: 0, Ea: 0}}",
+            "with a negative order",
+        ),
+        (
+            "{equation: H2 + 2 PT(S) => 2 H(S), sticking-coefficient: {A: 2.0, b: 0, Ea: 0}}",
+            "reaction.R1.sticking: found 2.0",
+        ),
+        (
+            "{equation: B + H2 + 2 PT(S) => B + 2 H(S), rate-constant: {A: 1 m^5/mol^2/s, b: 0, Ea: 0}}",
+            "with B of a solution",
+        ),
+    ],
+)
+def test_what_has_no_counterpart_is_refused_by_name(
+    reaction: str, line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when such a reaction is taken over as another, or the line does not name it; `mpm check` ends with 2."""
+    several = "of a solution" in line
+    text = SURFACE.format(
+        reaction=reaction,
+        solid="ideal-condensed, standard-concentration-basis: unity" if several else "fixed-stoichiometry",
+        solid_species="B, C" if several else "B",
+    ).replace(", standard", "\n  standard")
+    (tmp_path / "s.yaml").write_text(text)
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nbase = "single_zone"\n[chemistry]\nmechanism = "s.yaml"\n'
+    )
+    assert main(["check", str(tmp_path / "case.toml")]) == 2
+    said = capsys.readouterr().err
+    assert line in said and said.strip().count("\n") == 0 and "chemistry." in said
+
+
+@pytest.mark.parametrize(
+    ("chemistry", "line"),
+    [
+        ({"mechanism": "ptcombust.yaml", "gas_reactions": True}, "reaction 1 of gas, '2 O + M <=> O2 + M', of type three-body-Arrhenius; "
+         "accepted: elementary reactions by A, b and Ea, and sticking coefficients; gas_reactions = false leaves those of the gas out"),
+        ({"mechanism": "ptcombust.yaml", "phase": "Pt"}, "chemistry.phase: found 'Pt', no phase of ptcombust.yaml; "),
+        ({"mechanism": "sofc.yaml"}, "phase: found nothing, and 2 surface phases in sofc.yaml; accepted: one of metal_surface, oxide"),
+        ({"mechanism": "sofc.yaml", "phase": "oxide_surface"}, "which moves charge"),
+        ({"mechanism": "nothing.yaml"}, "chemistry.mechanism: found 'nothing.yaml', no such file"),
+        ({"mechanism": "alumina", "phase": "gas", "gas_reactions": True}, "found phase beside a mechanism that is no file of Cantera"),
+        ({"mechanism": "ptcombust.yaml", "gas_reactions": "no"}, "chemistry.gas_reactions: found 'no'; accepted: true or false"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_the_file_is_told(chemistry: dict[str, Any], line: str) -> None:
+    with pytest.raises(InputError) as caught:
+        case_of(**chemistry)
+    assert line in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_file_that_cantera_cannot_read_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "bad.yaml").write_text("a: [1, 2\nb: }")
+    with pytest.raises(
+        InputError,
+        match=r"bad\.yaml \(Error on line 2 of .*end of sequence flow not found\); accepted: a file that",
+    ):
+        case_of(str(tmp_path / "bad.yaml"))
+
+
+def test_without_the_package_the_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when a missing package is a traceback, or mechanisms in TOML need it."""
+    monkeypatch.setitem(__import__("sys").modules, "cantera", None)
+    with pytest.raises(
+        InputError, match=r"the package cantera is not installed; accepted: pip install 'mpm\[chemistry\]'"
+    ):
+        case_of("ptcombust.yaml")
+    assert load_case("single_zone").mechanism.name == "alumina"
