@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpm.advice.caveats import site_density_caveats
 from mpm.case.case import Case, load_case
 from mpm.cli import main
 from mpm.errors import InputError
@@ -278,3 +279,29 @@ def test_without_the_package_the_line_says_how_to_get_it(monkeypatch: pytest.Mon
     ):
         case_of("ptcombust.yaml")
     assert load_case("single_zone").mechanism.name == "alumina"
+
+
+def test_another_site_density_than_the_files_is_told() -> None:
+    """Fails when constants per site meet another number of sites than they were written for, and nobody says so."""
+    bed = [{"name": "bed", "height": "1 mm", "cells": 2, "material": "glass_beads"}]
+    case = case_of("ptcombust.yaml").with_(
+        {"geometry.layer": bed, "motion.gamma": 0.0, "motion.bed_velocity": "0 m/s"}
+    )
+    (line,) = site_density_caveats(case)
+    assert line.startswith(
+        "ptcombust was written for 2.7063e-05 mol/m2 of sites, here its constants per site meet 6.92e-08 mol/m2 of glass_beads"
+    )
+    assert site_density_caveats(case.with_({"material.glass_beads.site_density": "2.7063e-5 mol/m^2"})) == []
+    assert site_density_caveats(load_case("single_zone")) == []
+
+
+def test_a_new_case_of_a_file_of_cantera_is_that_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fails when `mpm new --from` forgets the phase or that the gas does not react."""
+    monkeypatch.chdir(tmp_path)
+    text = '[geometry]\nbase = "single_zone"\n[gas]\ntemperature = "900 K"\n'
+    chemistry = '[chemistry]\nmechanism = "ptcombust.yaml"\nphase = "Pt_surf"\ngas_reactions = false\n'
+    Path("case.toml").write_text(text + chemistry)
+    assert main(["new", "new.toml", "--from", "case.toml"]) == 0
+    assert load_case("new.toml") == load_case("case.toml")

@@ -23,6 +23,8 @@ SAME_ANGLE = math.radians(1.0)
 
 SAME_MASS = 0.01
 """Relative difference of a molar mass from that of the formula that is rounding or a mixture of isotopes."""
+SAME_SITES = 0.01
+"""Relative difference of a site density from that of a mechanism's file that is rounding."""
 SAME_DENSITY = 0.05
 """Relative difference of a typed density from the ideal gas' that real gases have."""
 SAME_PROPERTY = 2.0
@@ -129,6 +131,29 @@ def feed_caveats(case: Case) -> list[str]:
                 f"those of {fed[0]}"
             )
     return found
+
+
+def site_density_caveats(case: Case) -> list[str]:
+    """Materials with other sites per area than the file of Cantera has, whose constants per site were written for these."""
+    theirs = case.mechanism_site_density
+    if theirs is None:
+        return []
+    used = {layer.material_name: layer.material for layer in case.geometry.layers}
+    apart = [
+        name
+        for name, material in used.items()
+        if name is not None
+        and material is not None
+        and material.site_density > 0.0
+        and abs(material.site_density - theirs) > SAME_SITES * theirs
+    ]
+    if not apart:
+        return []
+    mine = ", ".join(f"{case.materials[name].site_density:.4g} mol/m2 of {name}" for name in apart)
+    return [
+        f"{case.mechanism.name} was written for {theirs:.5g} mol/m2 of sites, here its constants per site meet {mine}: "
+        f'material.{apart[0]}.site_density = "{theirs:.5g} mol/m^2" is that of the file'
+    ]
 
 
 def steady_caveats(case: Case) -> list[str]:

@@ -11,6 +11,7 @@ from mpm.advice.caveats import (
     mass_caveats,
     output_caveats,
     profile_caveats,
+    site_density_caveats,
     steady_caveats,
 )
 from mpm.advice.heat import energy_report, heat_warnings
@@ -234,6 +235,7 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
         *profile_caveats(case),
         *gas_caveats(case),
         *mass_caveats(case),
+        *site_density_caveats(case),
         *feed_caveats(case),
         *steady_caveats(case),
         *output_caveats(case),

@@ -18,13 +18,14 @@ from typing import Any
 
 from pydantic import PrivateAttr, ValidationError
 
+from mpm.case.cantera_file import cantera_site_density
 from mpm.case.chemistry import drop_heats
 from mpm.case.kinds import CASE, read_input
 from mpm.case.messages import to_input_error
 from mpm.case.names import case_file
 from mpm.case.notebook import case_html
 from mpm.case.schema import DRAFT, finished
-from mpm.case.sources import assemble, write_toml
+from mpm.case.sources import assemble, mechanism_source, write_toml
 from mpm.case.tables import CaseTables
 from mpm.case.walls import named_walls
 
@@ -65,6 +66,12 @@ class Case(CaseTables):
             key.removeprefix(f"{table}.").split(".")[0] for key in overrides if key.startswith(f"{table}.")
         }
         return below | (set(node) if isinstance(node, Mapping) else set())
+
+    @property
+    def mechanism_site_density(self) -> float | None:
+        """Sites per area [mol/m2] that the file of the mechanism is written for; None unless it is one of Cantera."""
+        of = self.origin
+        return cantera_site_density(mechanism_source(of.data, of.overrides), of.folder)
 
     def with_(self, changes: Mapping[str, Any]) -> Case:
         """Return the case that the same file gives with these dotted keys changed; everything is checked anew."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from mpm.case.cantera_file import is_cantera
 from mpm.case.case import Case, build_case, load_case
 from mpm.case.kinds import MECHANISM, kind_of_tables
 from mpm.case.names import case_file
@@ -14,8 +15,6 @@ from mpm.errors import InputError
 from mpm.files import is_file, write_atomically
 from mpm.screen import Listing, Sheet, figure, number, together
 
-CANTERA = (".yaml", ".yml")
-"""Endings of files that Cantera reads."""
 BARE = {
     "length": "10 mm",
     "cell_width": "2 mm",
@@ -48,10 +47,10 @@ def case_with(source: str, settings: Mapping[str, Any], phase: str | None, tempe
 
 def _is_mechanism(source: str) -> bool:
     path = Path(source)
+    if is_cantera(source):
+        return True  # a path, or a file that Cantera has
     if not is_file(path):
         return source in built_in_files("mechanisms")
-    if path.suffix in CANTERA:
-        return True
     return path.suffix == ".toml" and kind_of_tables(read_toml(case_file(source))) is MECHANISM
 
 

@@ -16,7 +16,7 @@ from mpm.case.case import Case, build_case, case_schema, load_case
 from mpm.case.keys import Address, Key, Value, keys_of, toml_name, toml_text, values
 from mpm.case.names import case_file
 from mpm.case.schema import for_people
-from mpm.case.sources import parse_toml
+from mpm.case.sources import mechanism_source, parse_toml
 from mpm.errors import InputError
 from mpm.files import is_file, write_atomically
 from mpm.units import parse
@@ -92,6 +92,7 @@ class _Writer:
         self.active = active
         self.folder = folder
         self.mechanism = _mechanism(case, folder)
+        self.of_cantera = mechanism_source(case.origin.data, {})
 
     def table(self, name: str, path: Address, described: bool = True, shown: bool = True) -> Iterator[str]:
         """The keys of one table and the tables below it; `described`: with comments, `shown`: with what is not active."""
@@ -131,8 +132,11 @@ class _Writer:
     def line(self, key: Key, path: Address, described: bool, shown: bool) -> Iterator[str]:
         """One key with its value: active, or behind a #."""
         below = self.below(path)
-        active = self.is_active(path)
-        if key.last == "name" and path[:1] == ("geometry",):
+        cantera = key.table == "chemistry" and key.last != "mechanism" and key.last in self.of_cantera
+        active = self.is_active(path) or cantera
+        if cantera:
+            text = toml_text(self.of_cantera[key.last])
+        elif key.last == "name" and path[:1] == ("geometry",):
             text = json.dumps(path[-2])
         elif active or below:
             said = {place: value for place, value in below.items() if not active or place in self.active}
