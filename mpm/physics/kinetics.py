@@ -1,7 +1,7 @@
-"""Rates of surface and gas reactions in many cells at once, implicit in the coverage.
+"""Rates of surface and gas reactions of the simplest kind in many cells at once, implicit in the coverage.
 
-Surface reaction r consumes gas g(r) on sites s(r):  rate r_r = k_r(T) C_g theta_s  [mol/m2/s].
-Over a step dt the coverages of a cell follow its new concentrations,
+Any other rate law: `mpm.physics.general_kinetics`. Surface reaction r consumes gas g(r) on sites s(r):  rate r_r = k_r(T) C_g theta_s
+[mol/m2/s]. Over a step dt the coverages of a cell follow its new concentrations,
 
     theta' = theta + (dt/n_s) sum_r nu_r r_r(C', theta'),   that is   (I - dt Q(C')) theta' = theta,
 
