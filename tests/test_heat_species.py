@@ -7,6 +7,7 @@ from mpm.case.case import Case, load_case
 from mpm.constants import GAS_CONSTANT
 from mpm.mesh.strip import Strip
 from mpm.physics.diffusion import thermal_diffusion
+from mpm.physics.kinetics import SurfaceKinetics
 from mpm.reactor.reactor import Reactor
 from mpm.transport.diffusant import Diffusant
 from mpm.transport.heat_flux import Diffusing
@@ -208,7 +209,7 @@ def test_rates_are_those_of_the_temperature_of_each_cell() -> None:
     )
     reactor, _ = run(case)
     kinetics, thermal = reactor.system.transport.reactions.surface, reactor.system.thermal
-    assert thermal is not None
+    assert thermal is not None and isinstance(kinetics, SurfaceKinetics)
     cells = reactor.system.coverage.cells
     hot = thermal.heat.temperature[cells]
     reaction = kinetics.reactions[0]

@@ -34,6 +34,7 @@ def balance_locally(
         source, slope = sources(c[:, active], active)
         held = diagonal[:, active] * c[:, active]
         residual = held - inflow[:, active] - source
+        # cells whose reactions were not found keep what they have
         loose = (np.abs(residual) > TIGHT * (held + inflow[:, active]) + idle).any(axis=0)
         active = active[loose]
         if not len(active):

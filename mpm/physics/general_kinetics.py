@@ -2,10 +2,9 @@
 
     n_s (theta_k' - theta_k)/dt = sum_r nu_kr r_r(C', theta')        nu: places that an event makes of kind k
 
-Newton's method in every cell by itself on the coverages, with the sums that no reaction changes (all places; each kind of site that never
-turns into another) in place of as many of these equations: they hold to rounding, however much faster than the step the reactions are. From
-where Newton's method does not arrive, it follows the solution from short steps to the whole one. A rate falls to zero with what it uses up,
-so that the solution lies within [0, 1]; iterates are kept there.
+Newton's method in every cell by itself on the coverages, its equations combined so that slow reactions do not drown in fast ones
+(`mpm.physics.slow_and_fast`). Where it does not arrive, pseudo-time does. A rate falls to zero with what it uses up, so that the solution
+lies within [0, 1]; iterates are kept there.
 
 Net rates of reactions that are almost at equilibrium are small differences of large numbers. Events are therefore corrected, by as much as
 these numbers are uncertain, to those that make the coverages what they are: what the gas sees and what the surface keeps agree to rounding.
@@ -23,22 +22,19 @@ from numpy.typing import ArrayLike, NDArray
 from mpm.arrays import Floats, Ints
 from mpm.physics.kinetics import Exposure
 from mpm.physics.rate_table import GasPart, Rates, RateTable
+from mpm.physics.slow_and_fast import Combined, combined
 from mpm.physics.small_systems import invariants, solve_cells
 
 if TYPE_CHECKING:
     from mpm.physics.mechanism import Mechanism
 
-TRIES = 40  # Newton iterations of a step
-SETTLED, LEAST = (
-    1e-10,
-    1e-25,
-)  # of a coverage and of all places: a change after which its square is below rounding
-STALLED, RESTS = 1e-7, 25  # a change that rounding alone keeps alive, after this many iterations
-SHRINK = 0.1  # factor on a coverage that an iteration would make negative
-LADDER = (
-    8.0  # factor between the steps on the way to one that was too long, and how short the first one may be
-)
-SHORTEST, RUNGS = 1e-25, 200
+TRIES = 30  # Newton iterations of a step
+SETTLED = 1e-10  # of a coverage: a change after which its square is below rounding
+STALLED, RESTS = 1e-6, 20  # of a coverage: a change that rounding alone keeps alive, after this many iterations
+LEAST = 1e-30  # of all places: so few are none
+SHRINK = 0.01  # factor on a coverage that an iteration would make negative
+FIRST, LONGER, SHORTER = 1e-6, 4.0, 0.1  # steps of pseudo-time, in units of the step
+LONG, LONGEST, SHORTEST, RELAXATIONS = 1e3, 1e12, 1e-30, 300
 SUBSTEPS = 4  # of solids that cross a cell
 
 
@@ -56,7 +52,10 @@ class Step:
 
 
 class GeneralKinetics:
-    """Surface reactions in cells with `sites` n_s (n,) [mol/m2], among the `coupled` gases; temperature [K] scalar or per cell."""
+    """Surface reactions in cells with `sites` n_s (n,) [mol/m2], among the `coupled` gases; temperature [K] scalar or per cell.
+
+    `sums` (sums, sites) of coverages stay whatever reacts: of all places, and of each kind of site that never turns into another.
+    """
 
     def __init__(self, mechanism: Mechanism, coupled: Sequence[str], sites: Floats, temperature: ArrayLike):
         self.sites = sites
@@ -64,7 +63,7 @@ class GeneralKinetics:
         names = mechanism.site_names
         nu = [[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]
         self.nu_places = np.array(nu).reshape(len(self.reactions), len(names)) * mechanism.places
-        self._sums, self._replaced = invariants(self.nu_places)
+        self.sums = invariants(self.nu_places)[0]
         self._table = RateTable(mechanism, self.reactions, coupled, sites)
         self.heat_to(temperature)
 
@@ -126,111 +125,100 @@ class GeneralKinetics:
         gas = self._table.gas_part(np.maximum(concentration, 0.0))
         new = self._solve(gas, theta, dt)
         at = self._table.rates(gas, new)
-        c, nu = len(concentration), self.nu_places
+        c = len(concentration)
+        equations = combined(self.nu_places, at.gross)
+        start = np.concatenate([theta[:, None], before.theta_c, before.theta_theta], axis=1)
         nothing = np.zeros(
-            (len(nu), before.theta_theta.shape[1], theta.shape[1])
+            (len(at.net), before.theta_theta.shape[1], theta.shape[1])
         )  # solids act through theta alone
         slopes = np.concatenate([at.by_gas, nothing], axis=1)
-        rhs = dt / self.sites * np.einsum("rk,rjn->kjn", nu, slopes)
-        rhs += np.concatenate([before.theta_c, before.theta_theta], axis=1)
-        for row, total in zip(self._replaced, self._sums, strict=True):
-            rhs[row, :c] = np.einsum("k,kjn->jn", total, before.theta_c)
-            rhs[row, c:] = np.einsum("k,kjn->jn", total, before.theta_theta)
-        response = solve_cells(self._matrix(at, dt), rhs)
+        rhs = equations.sum_sites(start[:, 1:]) + dt / self.sites * equations.sum_reactions(slopes)
+        response = solve_cells(self._matrix(equations, at, dt), rhs)
         slopes += np.einsum("rkn,kjn->rjn", at.by_site, response)
+        change = np.concatenate([new[:, None], response], axis=1) - start
         values = np.concatenate([at.net[:, None], slopes], axis=1)
-        change = np.concatenate([theta[:, None], before.theta_c, before.theta_theta], axis=1)
-        change = np.concatenate([new[:, None], response], axis=1) - change
-        values = self._corrected(values, change, at.gross, dt)
+        values = equations.corrected(values, self.sites / dt * equations.sum_sites(change))
         return Step(
             new, values[:, 0], response[:, :c], values[:, 1 : c + 1], response[:, c:], values[:, c + 1 :]
         )
 
-    def _corrected(self, values: Floats, change: Floats, gross: Floats, dt: Floats) -> Floats:
-        """Rates and their derivatives (reactions, m, n) that make the `change` of the coverages (sites, m, n) in the step `dt`.
-
-        r + W nu (nu^T W nu + sums)^-1 (n_s change/dt - nu^T r): the least correction, of every reaction by its weight W, its `gross` rate.
-        """
-        nu = self.nu_places
-        missing = self.sites / dt * change - np.einsum("rk,rjn->kjn", nu, values)
-        largest = gross.max(axis=0, initial=0.0)
-        weights = np.where(largest > 0.0, gross / np.where(largest > 0.0, largest, 1.0), 1.0) + 1e-9
-        normal = np.einsum("rk,rn,rl->kln", nu, weights, nu)
-        normal += np.einsum("sk,sl->kl", self._sums, self._sums)[:, :, None]
-        share = solve_cells(normal, missing)
-        return np.asarray(values + weights[:, None] * np.einsum("rk,kjn->rjn", nu, share))
-
-    def _matrix(self, at: Rates, dt: Floats) -> Floats:
-        """I - dt nu^T dr/dtheta / n_s, with the sums in place of as many rows, (sites, sites, n)."""
-        kinds = len(self.nu_places[0])
-        matrix = -dt / self.sites * np.einsum("rk,rln->kln", self.nu_places, at.by_site)
-        matrix += np.eye(kinds)[:, :, None]
-        for row, total in zip(self._replaced, self._sums, strict=True):
-            matrix[row] = total[:, None]
-        return np.asarray(matrix)
+    def _matrix(self, equations: Combined, at: Rates, dt: Floats, held: Floats | float = 0.0) -> Floats:
+        """T (1 + held) - dt T nu^T dr/dtheta / n_s, (equations, sites, n)."""
+        return np.asarray(
+            (1.0 + held) * equations.of_sites - dt / self.sites * equations.sum_reactions(at.by_site)
+        )
 
     # --- Newton's method ---
 
     def _solve(self, gas: GasPart, theta: Floats, dt: ArrayLike) -> Floats:
-        """Coverages at the end of a step of `dt` [s], scalar or (n,), from `theta`."""
+        """Coverages at the end of a step of `dt` [s], scalar or (n,), from `theta`; not numbers where none are found."""
         span = np.array(np.broadcast_to(np.asarray(dt, dtype=float), self.sites.shape))
-        new, found = self._newton(gas, theta, theta, span, np.arange(theta.shape[1]))
-        lost = np.flatnonzero(~found)
+        new, lost = self._newton(gas, theta, span)
         if len(lost):
-            new[:, lost] = self._follow(gas, theta, span, lost)
+            new[:, lost] = self.part(lost)._relax(gas.part(lost), theta[:, lost], span[lost])
         return np.clip(new, 0.0, 1.0)
 
-    def _newton(
-        self, gas: GasPart, theta: Floats, start: Floats, dt: Floats, cells: Ints
-    ) -> tuple[Floats, NDArray[np.bool_]]:
-        """Newton's method in `cells` from `start` (sites, cells); coverages (sites, cells) and where they were found."""
-        new, found = start.copy(), np.zeros(len(cells), dtype=bool)
-        active = np.arange(len(cells))
+    def _newton(self, gas: GasPart, theta: Floats, dt: Floats) -> tuple[Floats, Ints]:
+        """Newton's method in all cells; coverages (sites, n) and the cells in which it did not arrive."""
+        new, active, part = theta.copy(), np.arange(theta.shape[1]), self
         for tries in range(TRIES):
-            here, now = cells[active], new[:, active]
-            table = self._table if len(here) == len(self.sites) else self._table.part(here)
-            at = table.rates(gas if table is self._table else gas.part(here), now)
-            part = self if table is self._table else self.part(here)
-            old, span = theta[:, here], dt[here]
-            residual = now - old - span / part.sites * (self.nu_places.T @ at.net)
-            for row, total in zip(self._replaced, self._sums, strict=True):
-                residual[row] = total @ (now - old)
-            change = solve_cells(part._matrix(at, span), residual[:, None])[:, 0]
-            after = np.where(change < now, np.minimum(now - change, 1.0), SHRINK * now)
-            new[:, active] = after
-            free = change <= now + LEAST  # nothing held it back
-            limit = SETTLED * after + LEAST if tries < RESTS else STALLED
-            done = (free & (np.abs(change) <= limit)).all(axis=0)
-            found[active[done]] = True
-            active = active[~done & np.isfinite(change).all(axis=0)]
-            if not len(active):
-                break
-        return new, found
+            now = new[:, active]
+            change, _ = part._change(gas, theta[:, active], now, dt[active], 0.0)
+            new[:, active] = after = np.where(change < now, np.minimum(now - change, 1.0), SHRINK * now)
+            done = _arrived(change, now, after, SETTLED if tries < RESTS else STALLED)
+            if done.any():
+                active = active[~done]
+                if not len(active):
+                    break
+                part, gas = part.part(np.flatnonzero(~done)), gas.part(np.flatnonzero(~done))
+        return new, active
 
-    def _follow(self, gas: GasPart, theta: Floats, dt: Floats, cells: Ints) -> Floats:
-        """Coverages of `cells` by way of steps that grow from short ones to `dt`; not numbers where that does not lead there."""
-        whole = dt[cells]
-        reached = np.zeros(len(cells))  # share of the step whose end is known
-        trial = np.full(len(cells), LADDER**-8)
-        at, factor = theta[:, cells].copy(), np.full(len(cells), LADDER)
-        span = dt.copy()
-        for _ in range(RUNGS):
-            left = np.flatnonzero((reached < 1.0) & (trial > SHORTEST))
-            if not len(left):
-                break
-            here = cells[left]
-            span[here] = whole[left] * trial[left]
-            new, found = self._newton(gas, theta, at[:, left], span, here)
-            good, bad = left[found], left[~found]
-            at[:, good] = new[:, found]
-            reached[good] = trial[good]
-            trial[good] = np.minimum(trial[good] * factor[good], 1.0)
-            factor[bad] = np.maximum(np.sqrt(factor[bad]), 1.05)
-            first = bad[reached[bad] == 0.0]
-            factor[first] = LADDER
-            trial[bad] = np.where(reached[bad] > 0.0, reached[bad] * factor[bad], trial[bad] / LADDER**2)
-        at[:, reached < 1.0] = np.nan
-        return at
+    def _relax(self, gas: GasPart, theta: Floats, dt: Floats) -> Floats:
+        """The same from where Newton's method gets lost, as with reactions that their own products drive: pseudo-time.
+
+        d theta/ds = theta_before - theta + dt/n_s nu^T r rests at the end of the step. Linearly implicit steps in s of each cell's own
+        length: shorter after one in which a coverage would fall to less than SHRINK of what it is, longer after others.
+        """
+        new, n = theta.copy(), theta.shape[1]
+        left, part = np.arange(n), self
+        length = np.full(n, FIRST)
+        found = np.zeros(n, dtype=bool)
+        for _ in range(RELAXATIONS):
+            now = new[:, left]
+            change, moved = part._change(gas, theta[:, left], now, dt[left], 1.0 / length[left])
+            after = now - change
+            good = ((after >= SHRINK * now) | (now <= LEAST)).all(axis=0)
+            new[:, left[good]] = np.clip(after, 0.0, 1.0)[:, good]
+            done = good & _arrived(change, now, after, SETTLED) & (length[left] > LONG)
+            found[left[done]] = True
+            length[left] *= np.where(good, LONGER, SHORTER)
+            stay = ~done & (length[left] > SHORTEST) & np.isfinite(moved)
+            length = np.minimum(length, LONGEST)
+            if not stay.all():
+                left = left[stay]
+                if not len(left):
+                    break
+                part, gas = part.part(np.flatnonzero(stay)), gas.part(np.flatnonzero(stay))
+        new[:, ~found] = np.nan
+        return new
+
+    def _change(
+        self, gas: GasPart, before: Floats, now: Floats, dt: Floats, held: Floats | float
+    ) -> tuple[Floats, Floats]:
+        """Newton's change (sites, n), to be taken off `now`, with a storage `held` in pseudo-time [1], and its largest part (n,)."""
+        at = self._table.rates(gas, now)
+        equations = combined(self.nu_places, at.gross)
+        residual = equations.sum_sites((now - before)[:, None])
+        residual -= dt / self.sites * equations.sum_reactions(at.net[:, None])
+        matrix = self._matrix(equations, at, dt, held)
+        change = solve_cells(matrix, residual)[:, 0]
+        return change, np.abs(change).max(axis=0)
+
+
+def _arrived(change: Floats, now: Floats, after: Floats, close: float) -> NDArray[np.bool_]:
+    """Whether a `change` from `now` to `after` (sites, n) was the last of its cell: `close` to it, and nothing held it back."""
+    free = change <= now + LEAST
+    return np.asarray((free & (np.abs(after - now) <= close * after + LEAST)).all(axis=0))
 
 
 def _beyond(slopes: Floats, concentration: Floats) -> Floats:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mpm.arrays import Floats
 from mpm.physics.exponentials import dphi1, dphi2, phi1, phi2
+from mpm.physics.small_systems import invariants
 
 if TYPE_CHECKING:
     from mpm.physics.mechanism import Mechanism
@@ -59,6 +60,11 @@ class SurfaceKinetics:
         self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
             len(self.reactions), len(names)
         )
+
+    @property
+    def sums(self) -> Floats:
+        """Sums (sums, sites) of coverages that stay whatever reacts: of all sites, and of each kind that never turns into another."""
+        return invariants(self.nu_site)[0]
 
     def heat_to(self, temperature: ArrayLike) -> None:
         """Take the rate constants at another temperature [K], scalar or per cell."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from mpm.case.case import Case
     from mpm.case.materials import Material
-    from mpm.physics.kinetics import SurfaceKinetics
+    from mpm.physics.rate_solvers import Surface
 
 TIE = 1e-6  # of a column: half a column, reached by rounding from either side, is always not yet enough
 
@@ -97,7 +97,7 @@ class Coverage:
 
     # --- what changes it ---
 
-    def react(self, surface: SurfaceKinetics, concentration: Floats, dt: float) -> None:
+    def react(self, surface: Surface, concentration: Floats, dt: float) -> None:
         """Follow the gas at its new `concentration` (coupled, n) [mol/m3] over `dt` [s]."""
         self._theta = surface.coverage(concentration, self._theta, dt)
 

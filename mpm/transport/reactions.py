@@ -15,7 +15,7 @@ import numpy as np
 
 from mpm.arrays import Floats, Ints
 from mpm.mesh.strip import Strip
-from mpm.physics.kinetics import GasKinetics, SurfaceKinetics
+from mpm.physics.rate_solvers import gas_kinetics, surface_kinetics
 from mpm.physics.roles import Roles
 from mpm.transport.coverage import Coverage
 
@@ -46,8 +46,8 @@ class Reactions:
         self.strip, self.coverage = strip, coverage
         self.species, self.coupled = (*roles.coupled, *roles.products), len(roles.coupled)
         temperature = case.gas.temperature
-        self.surface = SurfaceKinetics(case.mechanism, roles.coupled, coverage.sites, temperature)
-        self.gas = GasKinetics(case.mechanism, roles.coupled, temperature)
+        self.surface = surface_kinetics(case.mechanism, roles.coupled, coverage.sites, temperature)
+        self.gas = gas_kinetics(case.mechanism, roles.coupled, strip.owned, temperature)
         self._nu_surface = self._stoichiometry(self.surface.reactions)
         self._nu_gas = self._stoichiometry(self.gas.reactions)
         self.tied = self._tied()

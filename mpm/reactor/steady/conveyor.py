@@ -8,17 +8,21 @@ theta_out = theta_in exp(-nu_s k C h/(|v_s| n_s)) (one reaction; `SurfaceKinetic
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mpm.arrays import Floats
-from mpm.parallel import total
+from mpm.parallel import largest, total
+from mpm.physics.kinetics import SurfaceKinetics
 
 if TYPE_CHECKING:
-    from mpm.physics.kinetics import SurfaceKinetics
+    from mpm.physics.rate_solvers import Surface
     from mpm.reactor.system import System
     from mpm.transport.coverage import Coverage
+
+TURNS, MET = 8, 1e-10  # Newton steps on the coverages of the whole bed, and a change of them that is none
 
 
 class Conveyor:
@@ -80,33 +84,64 @@ class Conveyor:
         return total(self.comm, gone - self.incoming(theta)[:, first] @ carried[first])
 
     def carry(
-        self, surface: SurfaceKinetics, concentration: Floats, theta: Floats, old: Floats, step: float
+        self, surface: Surface, concentration: Floats, theta: Floats, old: Floats, step: float
     ) -> Floats:
         """Coverages (sites, reactive cells) with those of moving cells at these concentrations (coupled, reactive cells): theta_out of
         every cell from the one before it; collective.
 
-        In every cell theta_out = M theta_in with a stochastic M, so the coverage stays within [0, 1]. Periodic solids come in as they
-        left: the fixed point of the product of all M.
+        In every cell theta_out = M theta_in + m. Where reactions are of first order, M is stochastic whatever comes in and m is nothing, so
+        the coverage stays within [0, 1]. Other rate laws have the tangents at what comes in, until that no longer changes. Periodic solids
+        come in as they left: the fixed point of all cells one after the other.
         """
         if not self.runs:
             return theta
+        part, c = surface.part(self.moving), concentration[:, self.moving]
+        if isinstance(part, SurfaceKinetics):
+            span = self.span(step)
+            responses = [
+                part.conveyed(c, np.repeat(e[:, None], len(self.moving), axis=1), span).out
+                for e in np.eye(len(theta))
+            ]
+            return self._along_bed(
+                part.sums, np.stack(responses, axis=1), np.zeros_like(theta), theta, old, step
+            )
+        return self._follow_tangents(part, c, theta, old, step)
+
+    def _follow_tangents(
+        self, part: Surface, concentration: Floats, theta: Floats, old: Floats, step: float
+    ) -> Floats:
+        """`carry` by Newton's method on the coverages of the whole bed; what it has after TURNS is a guess."""
+        entering = self.entering(step, theta, old)
+        for _ in range(TURNS):
+            passed = part.conveyed(concentration, entering, self.span(step))
+            rest = np.zeros_like(theta)
+            rest[:, self.moving] = passed.out - np.einsum("oin,in->on", passed.out_theta, entering)
+            theta = self._along_bed(part.sums, passed.out_theta, rest, theta, old, step)
+            before, entering = entering, self.entering(step, theta, old)
+            if largest(self.comm, [np.abs(entering - before).max(initial=0.0)])[0] < MET:
+                break
+        return theta
+
+    def _along_bed(
+        self, sums: Floats, maps: Floats, rest: Floats, theta: Floats, old: Floats, step: float
+    ) -> Floats:
+        """`theta` with the coverages of moving cells that follow from `maps` M (out, in, moving) and `rest` m (sites, reactive)."""
         coverage, kinds, moving = self.coverage, len(theta), self.moving
-        span = self.span(step)
-        share = span / self.residence
-        part, c = surface.part(moving), concentration[:, moving]
-        unit = np.eye(kinds)
-        responses = [part.conveyed(c, np.repeat(e[:, None], len(moving), axis=1), span).out for e in unit]
-        local = np.zeros((kinds * kinds + kinds, len(coverage.cells)))
-        local[: kinds * kinds, moving] = np.concatenate(responses)  # column by column of M
-        local[kinds * kinds :, moving] = old[:, moving]
+        share = self.span(step) / self.residence
+        local = np.zeros((kinds * kinds + 2 * kinds, len(coverage.cells)))
+        local[: kinds * kinds, moving] = np.swapaxes(maps, 0, 1).reshape(
+            kinds * kinds, -1
+        )  # column by column of M
+        local[kinds * kinds : kinds * kinds + kinds, moving] = old[:, moving]
+        local[kinds * kinds + kinds :] = rest
         whole = self.whole(local)[:, coverage.moving_rows]
-        maps = whole[: kinds * kinds].reshape(kinds, kinds, *whole.shape[1:]).T  # (columns, rows, out, in)
-        aged = (1.0 - share) * whole[kinds * kinds :].T  # (columns, rows, sites)
+        columns = whole[: kinds * kinds].reshape(kinds, kinds, *whole.shape[1:]).T  # (columns, rows, out, in)
+        aged = (1.0 - share) * whole[kinds * kinds : kinds * kinds + kinds].T  # (columns, rows, sites)
+        more = whole[kinds * kinds + kinds :].T
         way = self.direction  # columns in the order in which solids meet them
         left = np.empty_like(aged)
-        left[::way] = _along(
-            maps[::way], aged[::way], share, coverage.fresh[:, coverage.moving_rows].T, coverage.periodic
-        )
+        bed = Bed(columns[::way], aged[::way], more[::way], share, sums)
+        left[::way] = bed.along(coverage.fresh[:, coverage.moving_rows].T, coverage.periodic)
         result = np.zeros((kinds, len(coverage.rows), coverage.columns))
         result[:, coverage.moving_rows] = left.T
         new = theta.copy()
@@ -114,28 +149,41 @@ class Conveyor:
         return new
 
 
-def _along(maps: Floats, aged: Floats, share: float, fresh: Floats, periodic: bool) -> Floats:
-    """Coverages (columns, rows, sites) that leave column after column: theta = M (share theta_before + aged)."""
-    incoming = _fixed_point(maps, aged, share, fresh) if periodic else fresh
-    left = np.empty_like(aged)
-    for column, (m, more) in enumerate(zip(maps, aged, strict=True)):
-        incoming = np.einsum("roi,ri->ro", m, share * incoming + more)
-        incoming = np.maximum(incoming, 0.0)
-        # rounding would add up along the bed
-        incoming = left[column] = incoming / incoming.sum(axis=1, keepdims=True)
-    return left
+@dataclass(frozen=True, eq=False)
+class Bed:
+    """Cells of a bed in the order in which solids meet them: theta_out = M (share theta_before + aged) + rest.
 
+    `maps` M (columns, rows, out, in), `aged` and `rest` (columns, rows, sites). `sums` (sums, sites): what stays along the way.
+    """
 
-def _fixed_point(maps: Floats, aged: Floats, share: float, start: Floats) -> Floats:
-    """Coverage (rows, sites) that the solids bring back after one turn: theta = A theta + c of all columns together."""
-    kinds = maps.shape[-1]
-    product = np.broadcast_to(np.eye(kinds), maps.shape[1:]).copy()
-    constant = np.zeros(maps.shape[1:3])
-    for m, more in zip(maps, aged, strict=True):
-        product = share * m @ product
-        constant = np.einsum("roi,ri->ro", m, share * constant + more)
-    theta = start.copy()
-    for row in range(len(product)):
-        gap = np.eye(kinds) - product[row]
-        theta[row] = np.linalg.lstsq(np.vstack([gap, np.ones(kinds)]), np.append(constant[row], 1.0))[0]
-    return theta
+    maps: Floats
+    aged: Floats
+    rest: Floats
+    share: float
+    sums: Floats
+
+    def along(self, fresh: Floats, periodic: bool) -> Floats:
+        """Coverages (columns, rows, sites) that leave column after column, from `fresh` ones (rows, sites)."""
+        incoming = self._fixed_point(fresh) if periodic else fresh
+        left = np.empty_like(self.aged)
+        for column, (m, more, rest) in enumerate(zip(self.maps, self.aged, self.rest, strict=True)):
+            incoming = np.einsum("roi,ri->ro", m, self.share * incoming + more) + rest
+            incoming = np.maximum(incoming, 0.0)
+            # rounding would add up along the bed
+            incoming = left[column] = incoming / incoming.sum(axis=1, keepdims=True)
+        return left
+
+    def _fixed_point(self, start: Floats) -> Floats:
+        """Coverage (rows, sites) that the solids bring back after one turn: theta = A theta + c of all columns together."""
+        kinds = self.maps.shape[-1]
+        product = np.broadcast_to(np.eye(kinds), self.maps.shape[1:]).copy()
+        constant = np.zeros(self.maps.shape[1:3])
+        for m, more, rest in zip(self.maps, self.aged, self.rest, strict=True):
+            product = self.share * m @ product
+            constant = np.einsum("roi,ri->ro", m, self.share * constant + more) + rest
+        theta = start.copy()
+        for row in range(len(product)):
+            gap = np.eye(kinds) - product[row]
+            kept = self.sums @ start[row]
+            theta[row] = np.linalg.lstsq(np.vstack([gap, self.sums]), np.append(constant[row], kept))[0]
+        return theta
