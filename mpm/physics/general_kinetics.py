@@ -30,8 +30,14 @@ if TYPE_CHECKING:
 
 TRIES = 30  # Newton iterations of a step
 SETTLED = 1e-10  # of a coverage: a change after which its square is below rounding
-STALLED, RESTS = 1e-6, 20  # of a coverage: a change that rounding alone keeps alive, after this many iterations
-LEAST = 1e-30  # of all places: so few are none
+STALLED, RESTS = (
+    1e-6,
+    20,
+)  # of a coverage: a change that rounding alone keeps alive, after this many iterations
+LEAST, ROUNDING = (
+    1e-22,
+    1e-17,
+)  # of all places: so few are none, and what those differences that are left of all of them are known to
 SHRINK = 0.01  # factor on a coverage that an iteration would make negative
 FIRST, LONGER, SHORTER = 1e-6, 4.0, 0.1  # steps of pseudo-time, in units of the step
 LONG, LONGEST, SHORTEST, RELAXATIONS = 1e3, 1e12, 1e-30, 300
@@ -163,9 +169,9 @@ class GeneralKinetics:
         new, active, part = theta.copy(), np.arange(theta.shape[1]), self
         for tries in range(TRIES):
             now = new[:, active]
-            change, _ = part._change(gas, theta[:, active], now, dt[active], 0.0)
+            change = part._change(gas, theta[:, active], now, dt[active], 0.0)
             new[:, active] = after = np.where(change < now, np.minimum(now - change, 1.0), SHRINK * now)
-            done = _arrived(change, now, after, SETTLED if tries < RESTS else STALLED)
+            done = _arrived(change, now, after, tries >= RESTS)
             if done.any():
                 active = active[~done]
                 if not len(active):
@@ -185,14 +191,14 @@ class GeneralKinetics:
         found = np.zeros(n, dtype=bool)
         for _ in range(RELAXATIONS):
             now = new[:, left]
-            change, moved = part._change(gas, theta[:, left], now, dt[left], 1.0 / length[left])
+            change = part._change(gas, theta[:, left], now, dt[left], 1.0 / length[left])
             after = now - change
-            good = ((after >= SHRINK * now) | (now <= LEAST)).all(axis=0)
+            good = ((after >= SHRINK * now) | (np.abs(after) <= LEAST)).all(axis=0)
             new[:, left[good]] = np.clip(after, 0.0, 1.0)[:, good]
-            done = good & _arrived(change, now, after, SETTLED) & (length[left] > LONG)
+            done = good & _arrived(change, now, after, length[left] >= LONGEST) & (length[left] > LONG)
             found[left[done]] = True
             length[left] *= np.where(good, LONGER, SHORTER)
-            stay = ~done & (length[left] > SHORTEST) & np.isfinite(moved)
+            stay = ~done & (length[left] > SHORTEST) & np.isfinite(change).all(axis=0)
             length = np.minimum(length, LONGEST)
             if not stay.all():
                 left = left[stay]
@@ -202,23 +208,21 @@ class GeneralKinetics:
         new[:, ~found] = np.nan
         return new
 
-    def _change(
-        self, gas: GasPart, before: Floats, now: Floats, dt: Floats, held: Floats | float
-    ) -> tuple[Floats, Floats]:
-        """Newton's change (sites, n), to be taken off `now`, with a storage `held` in pseudo-time [1], and its largest part (n,)."""
+    def _change(self, gas: GasPart, before: Floats, now: Floats, dt: Floats, held: Floats | float) -> Floats:
+        """Newton's change (sites, n), to be taken off `now`, with a storage `held` in pseudo-time [1]."""
         at = self._table.rates(gas, now)
         equations = combined(self.nu_places, at.gross)
         residual = equations.sum_sites((now - before)[:, None])
         residual -= dt / self.sites * equations.sum_reactions(at.net[:, None])
         matrix = self._matrix(equations, at, dt, held)
-        change = solve_cells(matrix, residual)[:, 0]
-        return change, np.abs(change).max(axis=0)
+        return solve_cells(matrix, residual)[:, 0]
 
 
-def _arrived(change: Floats, now: Floats, after: Floats, close: float) -> NDArray[np.bool_]:
-    """Whether a `change` from `now` to `after` (sites, n) was the last of its cell: `close` to it, and nothing held it back."""
-    free = change <= now + LEAST
-    return np.asarray((free & (np.abs(after - now) <= close * after + LEAST)).all(axis=0))
+def _arrived(change: Floats, now: Floats, after: Floats, late: ArrayLike) -> NDArray[np.bool_]:
+    """Whether a `change` from `now` to `after` (sites, n) was the last of its cell, as it seems or, when it is `late`, as far as rounding
+    lets one see; and nothing held it back."""
+    close, least = np.where(late, STALLED, SETTLED), np.where(late, ROUNDING, LEAST)
+    return np.asarray(((change <= now + least) & (np.abs(after - now) <= close * after + least)).all(axis=0))
 
 
 def _beyond(slopes: Floats, concentration: Floats) -> Floats:

@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpm.arrays import Floats, Ints
+from mpm.physics.small_systems import swap_rows
 
 NOTHING = 1e-12  # of a combined coefficient: what rounding leaves of one that is zero
 
@@ -51,7 +51,8 @@ class Combined:
 
 
 def combined(nu: Floats, speed: Floats) -> Combined:
-    """The equations of sites with stoichiometry `nu` (reactions, sites), in cells where reactions have this gross `speed` (reactions, n)."""
+    """The equations of sites with stoichiometry `nu` (reactions, sites), in cells where reactions have this gross `speed` (reactions,
+    n)."""
     kinds, n = nu.shape[1], speed.shape[1]
     cells = np.arange(n)
     reactions = np.repeat(nu.T[:, :, None], n, axis=2)
@@ -63,8 +64,8 @@ def combined(nu: Floats, speed: Floats) -> Combined:
         fastest = speeds.argmax(axis=0)
         some = left[fastest, cells]
         row = i + np.abs(reactions[i:, fastest, cells]).argmax(axis=0)
-        _swap(reactions, i, row)
-        _swap(sites, i, row)
+        swap_rows(reactions, i, row)
+        swap_rows(sites, i, row)
         leading[i] = np.where(some, fastest, -1)
         pivot = np.where(some, reactions[i, fastest, cells], 1.0)
         for j in range(i + 1, kinds):
@@ -73,12 +74,3 @@ def combined(nu: Floats, speed: Floats) -> Combined:
             sites[j] -= factor * sites[i]
             reactions[j][np.abs(reactions[j]) < NOTHING] = 0.0
     return Combined(sites, reactions, leading)
-
-
-def _swap(rows: Floats, one: int, other: NDArray[np.integer]) -> None:
-    """Swap row `one` with row `other` (n,) of every cell, in place."""
-    cells = np.flatnonzero(other != one)
-    if len(cells):
-        there = rows[other[cells], :, cells].copy()
-        rows[other[cells], :, cells] = rows[one][:, cells].T
-        rows[one][:, cells] = there.T

@@ -3,23 +3,56 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mpm.arrays import Floats
 
 
+SLIGHTEST = 1e-20  # pivot of a singular matrix whose rows are of size one
+
+
 def solve_cells(matrix: Floats, rhs: Floats) -> Floats:
-    """x (k, m, n) of `matrix` (k, k, n) x = `rhs` (k, m, n) in every one of n cells; not numbers where one of them is singular.
+    """x (k, m, n) of `matrix` (k, k, n) x = `rhs` (k, m, n) in every one of n cells; where one is singular, of one that hardly differs.
 
     Rows are scaled first: rates of sites are decades apart.
     """
     scale = np.abs(matrix).max(axis=1)
     scale = 1.0 / np.where(scale > 0.0, scale, 1.0)
-    a = np.moveaxis(matrix * scale[:, None], 2, 0)
-    b = np.moveaxis(rhs * scale[:, None], 2, 0)
+    a, b = matrix * scale[:, None], rhs * scale[:, None]
     try:
-        return np.ascontiguousarray(np.moveaxis(np.linalg.solve(a, b), 0, 2))
-    except np.linalg.LinAlgError:
-        return np.full_like(rhs, np.nan)
+        x = np.linalg.solve(np.moveaxis(a, 2, 0), np.moveaxis(b, 2, 0))
+        return np.ascontiguousarray(np.moveaxis(x, 0, 2))
+    except np.linalg.LinAlgError:  # one cell's is singular, and LAPACK then gives none of the others
+        return _eliminated(a, b)
+
+
+def _eliminated(a: Floats, b: Floats) -> Floats:
+    """The same by elimination with pivots from the column, in all cells at once, in place."""
+    k = len(a)
+    for i in range(k):
+        row = i + np.abs(a[i:, i]).argmax(axis=0)
+        swap_rows(a, i, row)
+        swap_rows(b, i, row)
+        pivot = a[i, i]
+        pivot[np.abs(pivot) < SLIGHTEST] = SLIGHTEST
+        for j in range(i + 1, k):
+            factor = a[j, i] / pivot
+            a[j] -= factor * a[i]
+            b[j] -= factor * b[i]
+    for i in reversed(range(k)):
+        for j in range(i + 1, k):
+            b[i] -= a[i, j] * b[j]
+        b[i] /= a[i, i]
+    return b
+
+
+def swap_rows(rows: Floats, one: int, other: NDArray[np.integer]) -> None:
+    """Swap row `one` of `rows` (rows, m, n) with row `other` (n,) in every cell, in place."""
+    cells = np.flatnonzero(other != one)
+    if len(cells):
+        there = rows[other[cells], :, cells].copy()
+        rows[other[cells], :, cells] = rows[one][:, cells].T
+        rows[one][:, cells] = there.T
 
 
 def invariants(changes: Floats) -> tuple[Floats, list[int]]:
