@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from mpm.arrays import Floats
 
-
 SLIGHTEST = 1e-20  # pivot of a singular matrix whose rows are of size one
 
 

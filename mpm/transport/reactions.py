@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mpm.arrays import Floats, Ints
+from mpm.errors import ConvergenceError
 from mpm.mesh.strip import Strip
+from mpm.parallel import any_rank
 from mpm.physics.rate_solvers import gas_kinetics, surface_kinetics
 from mpm.physics.roles import Roles
 from mpm.transport.coverage import Coverage
@@ -73,6 +75,11 @@ class Reactions:
         self.gas.heat_to(temperature)
 
     @property
+    def start_by_themselves(self) -> bool:
+        """Whether one of them needs no gas: it happens where none is fed."""
+        return any(not law.gas_orders for reaction in self.surface.reactions for law in reaction.laws)
+
+    @property
     def gas_volume(self) -> Floats:
         """Volume of the gas in own cells [m2]."""
         return self.strip.gas_volume[: self.strip.owned]
@@ -83,6 +90,14 @@ class Reactions:
             np.zeros((len(self._nu_surface), len(self.coverage.cells))),
             np.zeros((len(self._nu_gas), self.strip.owned)),
         )
+
+    def without_gas(self, dt: float) -> Events:
+        """What happens in `dt` [s] where no gas has a say: sites turn into others, or let a gas go for good. Raises ConvergenceError;
+        collective."""
+        rates, _ = self.surface.rates(np.zeros((0, len(self.coverage.cells))), self.coverage.theta, dt)
+        if any_rank(self.strip.comm, not np.isfinite(rates).all()):
+            raise ConvergenceError("surface reactions: no coverage was found")
+        return self.events(rates, self.none().gas)
 
     def events(self, surface_rates: Floats, gas_rates: Floats) -> Events:
         """From rates per area (reactions, reactive cells) [mol/m2/s] and per volume of gas (reactions, own) [mol/m3/s]."""

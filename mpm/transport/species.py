@@ -42,7 +42,9 @@ NEWTON_LIMIT = 30
 FILL = {"resolved": (1, 0), "averaged": (2, 2), "steady": (2, 2)}
 # backward-error floor, relative to the sum of |diagonal C|: a residual below that is rounding, and accepted
 ROUNDING = float(np.finfo(float).eps)
-UNDERSHOOT = 1e-15  # of the largest feed concentration: a step is accepted only when nothing lies below
+UNDERSHOOT = (
+    1e-15  # of the largest concentration, feeds included: a step is accepted only when nothing lies below
+)
 IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 HALVINGS = 6
 BALANCED = 1e-4  # residual below which Newton's steps have no need of balanced cells
@@ -213,6 +215,9 @@ class Transport:
             new[:coupled], events = self._solve_coupled(
                 self._newton, operators[:coupled], dt, old[:coupled], supply[:coupled], foreseen[:coupled]
             )
+        elif self.reactions.surface.reactions:
+            events = self.reactions.without_gas(dt)
+        if self.reactions.surface.reactions:
             self.coverage.react(self.reactions.surface, new[:coupled][:, self.coverage.cells], dt)
         made = self.reactions.made(events, slice(coupled, None))
         # where more has reacted than was foreseen, more is made
@@ -252,9 +257,10 @@ class Transport:
             residual = self._products(matrices, new) - rhs - reactions.made(events, slice(self.coupled))
             size, carried = total(self.strip.comm, [np.abs(residual).sum(), np.abs(diagonal * new).sum()])
             worst = size / scale
-            low = -largest(self.strip.comm, [-new.min(initial=0.0)])[0]
+            lowest, highest = largest(self.strip.comm, [-new.min(initial=0.0), new.max(initial=0.0)])
+            low, most = -lowest, max(highest, self.ports.largest_feed)
             accepted = max(RESIDUAL, ROUNDING * carried / scale)
-            if worst < accepted and low >= -UNDERSHOOT * self.ports.largest_feed:
+            if worst < accepted and low >= -UNDERSHOOT * most:
                 return new, events
             if not np.isfinite(worst):
                 break

@@ -44,7 +44,7 @@ def balanced(system: SteadySystem, predicted: Floats, now: Iterate, old: Iterate
         return source, slope
 
     start = np.maximum(np.where(predicted > 0.0, predicted, now.concentration), LOWEST)
-    idle = NEGLIGIBLE * ports.feed_rate / max(system.strip.grid.cells, 1)
+    idle = NEGLIGIBLE * system.scale / max(system.strip.grid.cells, 1)
     return balance_locally(start, system.outflow + storage, inflow, sources, idle)
 
 

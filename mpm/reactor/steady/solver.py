@@ -20,7 +20,8 @@ from mpm.numerics.memory import give_back
 from mpm.parallel import any_rank, largest
 from mpm.reactor.steady.cellwise import balanced
 from mpm.reactor.steady.coarsening import coarser, prolonged
-from mpm.reactor.steady.system import Evaluation, Iterate, SteadySystem
+from mpm.reactor.steady.conveyor import Conveyor
+from mpm.reactor.steady.system import LAST_STEP, Evaluation, Iterate, SteadySystem
 from mpm.reactor.system import System
 from mpm.transport.fluxes import FluxOperator
 from mpm.transport.reactions import Events
@@ -226,13 +227,47 @@ class TracerSolver:
         _book(transport, operators, transport.ports.steady_shares, transport.reactions.none())
 
 
+class SolidsSolver:
+    """The steady state where the gas has no say in what reacts: solids change on their way, and what they let go is carried off."""
+
+    iterations = 0
+
+    def __init__(self, system: System):
+        self.system = system
+        self.conveyor = Conveyor(system)
+
+    def solve(self) -> None:
+        """Nothing to iterate on."""
+
+    def hand_over(self) -> None:
+        """Find coverages and concentrations, and book one second of them. Raises ConvergenceError."""
+        system, conveyor = self.system, self.conveyor
+        transport, coverage, surface = system.transport, system.coverage, system.transport.reactions.surface
+        nothing, old = np.zeros((0, len(coverage.cells))), coverage.theta
+        theta = conveyor.carry(surface, nothing, old, old, LAST_STEP)
+        moving, resting = conveyor.moving, conveyor.resting
+        rates = np.zeros((len(surface.reactions), len(coverage.cells)))
+        entering = conveyor.entering(LAST_STEP, theta, old)
+        passed = surface.part(moving).conveyed(nothing[:, moving], entering, conveyor.span(LAST_STEP))
+        rates[:, moving], theta[:, moving] = passed.rates, passed.out
+        still = surface.part(resting)
+        rates[:, resting] = still.rates(nothing[:, resting], old[:, resting], LAST_STEP)[0]
+        theta[:, resting] = still.coverage(nothing[:, resting], old[:, resting], LAST_STEP)
+        if any_rank(system.comm, not (np.isfinite(rates).all() and np.isfinite(theta).all())):
+            raise ConvergenceError("steady state: no coverage was found; try fidelity averaged")
+        no_gas = np.zeros((len(transport.reactions.gas.reactions), transport.strip.owned))
+        events = transport.reactions.events(rates, no_gas)
+        _book(transport, system.operators(system.velocity), transport.ports.steady_shares, events)
+        coverage.become(theta, conveyor.passed(theta))
+
+
 def species_problem(system: System, watch: Watch) -> SteadyProblem:
-    """The species and coverage of a system in its steady flow: nonlinear where gas that reacts comes in."""
-    ports, coupled = system.transport.ports, system.transport.coupled
+    """The species and coverage of a system in its steady flow: nonlinear where gas that reacts comes in or off the solids."""
+    ports, reactions, coupled = system.transport.ports, system.transport.reactions, system.transport.coupled
     supply = ports.supply(system.operators(system.velocity), ports.steady_shares, {})[:coupled]
-    if any_rank(system.comm, bool(supply.any())):
+    if coupled and (reactions.start_by_themselves or any_rank(system.comm, bool(supply.any()))):
         return SteadySolver(system, watch)
-    return TracerSolver(system)
+    return SolidsSolver(system) if reactions.start_by_themselves else TracerSolver(system)
 
 
 def _book(transport: Transport, operators: Sequence[FluxOperator], shares: Floats, events: Events) -> None:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from mpm.transport.fluxes import PortFlux
 
 LAST_STEP = 1e12  # s, shortest last pseudo-time step
+NO_FEED = 1e-30  # mol/m/s, where nothing is fed and nothing moves
 STORED = 1e-10  # of the largest feed: what the solids at rest may still take up over the last step
 
 
@@ -56,7 +57,10 @@ class Evaluation:
 
 
 class SteadySystem:
-    """Residual and Jacobian of a reactor's `system` in its steady flow. At least one species that reacts is fed."""
+    """Residual and Jacobian of a reactor's `system` in its steady flow, in which gas reacts.
+
+    `scale` [mol/m/s]: the largest feed, or the sites that pass where those let gas go by themselves.
+    """
 
     def __init__(self, system: System):
         self.system, self.strip = system, system.strip
@@ -73,7 +77,11 @@ class SteadySystem:
         self.outflow = np.stack([operator.outflow for operator in self.operators])
         self.start = Iterate(self.transport.concentration[: self.coupled].copy(), self.coverage.theta)
         held = total(self.strip.comm, [self.coverage.capacity[self.conveyor.resting].sum()])[0]
-        self.last_step = max(LAST_STEP, float(held) / (STORED * self.ports.feed_rate))
+        self.scale = self.ports.feed_rate
+        if self.reactions.start_by_themselves:
+            moved = total(self.strip.comm, [self.coverage.capacity[self.conveyor.moving].sum()])[0]
+            self.scale = max(self.scale, float(moved) / self.conveyor.residence, NO_FEED)
+        self.last_step = max(LAST_STEP, float(held) / (STORED * self.scale))
         self._drawing: list[PortFlux] = (
             list(self.operators[0].outlets.values()) if self.operators[0].drawn_in else []
         )
@@ -155,11 +163,11 @@ class SteadySystem:
         return Evaluation(gas, coverage, events, slopes, gas_slopes, conveyed, self._size(gas, coverage))
 
     def _size(self, gas: Floats, coverage: Floats) -> float:
-        """Sum of |gas residual| plus that of the coverage in sites per second, over the largest feed."""
+        """Sum of |gas residual| plus that of the coverage in sites per second, over `scale`."""
         moving, residence = self.conveyor.moving, self.conveyor.residence
         sites = np.abs(coverage) @ self.coverage.capacity[moving] / residence if len(moving) else np.zeros(1)
         parts = total(self.strip.comm, [np.abs(gas).sum(), sites.sum()])
-        return float(parts.sum() / self.ports.feed_rate)
+        return float(parts.sum() / self.scale)
 
     # --- Jacobian ---
 
