@@ -288,7 +288,9 @@ class Transport:
 
         def sources(c: Floats, active: NDArray[np.intp]) -> tuple[Floats, Floats]:
             rates = reactions.surface.part(active).rates(c, theta[:, active], dt)
-            return reactions.on_surfaces(active, *rates)
+            made, slopes = reactions.on_surfaces(active, *rates)
+            in_gas = reactions.in_gas(cells[active], c)
+            return made + in_gas[0], slopes + in_gas[1]
 
         idle = IDLE * self.ports.feed_rate
         start = np.maximum(new[:, cells], LOWEST)
