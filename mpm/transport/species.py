@@ -22,6 +22,7 @@ from mpm.flow.state import GasState
 from mpm.mesh.strip import Strip
 from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.parallel import Scatter, largest, total
+from mpm.physics.kinetics import SurfaceKinetics
 from mpm.physics.roles import Roles
 from mpm.transport.cell_matrix import FALL, FALL_HEATED, StepMatrix
 from mpm.transport.coverage import Coverage
@@ -29,7 +30,7 @@ from mpm.transport.diffusant import Diffusant
 from mpm.transport.fluxes import FluxAssembler, FluxOperator
 from mpm.transport.foresight import REMEMBERED, Past, possible
 from mpm.transport.ledger import Entries, Ledger
-from mpm.transport.newton import RESIDUAL, NewtonSystem, forcing
+from mpm.transport.newton import RESIDUAL, NewtonSystem, fill_levels, forcing
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Events, Reactions
 
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
 
 Operators = list[FluxOperator]  # of one velocity field, one per species
 NEWTON_LIMIT = 30
-# levels of fill-in of the incomplete factors, for reacting species and for products: with `resolved` every step has a matrix of its own
-FILL = {"resolved": (1, 0), "averaged": (2, 2), "steady": (2, 2)}
 # backward-error floor, relative to the sum of |diagonal C|: a residual below that is rounding, and accepted
 ROUNDING = float(np.finfo(float).eps)
 UNDERSHOOT = (
@@ -47,7 +46,9 @@ UNDERSHOOT = (
 )
 IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 HALVINGS = 6
-BALANCED = 1e-4  # residual below which Newton's steps have no need of balanced cells
+# residual below which Newton's steps have no need of balanced cells; where a cell takes long, as general rate laws do, the first balance
+# has most of the gain
+BALANCED = 1e-4
 NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
 
 
@@ -84,7 +85,7 @@ class Transport:
         self._dispersion: Floats | None = None
         self._gas: GasState | None = None
         self._assemble()
-        fill, product_fill = FILL[case.fidelity]
+        fill, product_fill = fill_levels(case.fidelity, self.coupled)
         residual, fall = self.ports.feed_rate * RESIDUAL, FALL if case.energy is None else FALL_HEATED
         self._linear = [
             StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill, fall)
@@ -268,7 +269,7 @@ class Transport:
             for i in range(self.coupled):
                 blocks[:, i, i] += diagonal[i]
             new = new - newton.solve(blocks, residual, forcing(worst), first=iteration == 0)
-            if worst > BALANCED:
+            if worst > BALANCED and isinstance(reactions.surface, SurfaceKinetics):
                 new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
