@@ -113,3 +113,32 @@ def test_schemas_know_the_keys_that_are_read() -> None:
 def test_an_unknown_kind_of_schema(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema", "swep"]) == 2
     assert "case, sweep, powder, mechanism (did you mean sweep?)" in capsys.readouterr().err
+
+
+def test_the_schema_of_mechanisms_knows_rate_laws() -> None:
+    """Fails when an editor would mark what is right (one equilibrium constant or a table of it) or pass what is wrong."""
+    check = jsonschema.Draft202012Validator(mechanism_schema()).is_valid
+
+    def with_keys(**keys: Any) -> dict[str, Any]:
+        return {"reaction": {"r": {"equation": "A + * <=> A*", "A": "1 m/s", **keys}}}
+
+    for right in (
+        {"equilibrium_constant": "2 m^3/mol"},
+        {"equilibrium_constant": 2},
+        {"equilibrium_constant": {"A": "2 m^3/mol", "Ea": "-40 kJ/mol"}},
+        {"reverse": {"A": "1e13 1/s", "orders": {"A*": 1}, "coverage": {"A*": {"E": "5 kJ/mol"}}}},
+        {"orders": {"A": 0.5}, "motz_wise": False},
+    ):
+        assert check(with_keys(**right)), right
+    for wrong in (
+        {"equilibrium_constant": True},
+        {"reverse": "1e13 1/s"},
+        {"reverse": {"sticking": 0.1}},
+        {"orders": {"A": 5}},
+        {"coverage": {"A*": 3}},
+    ):
+        assert not check(with_keys(**wrong)), wrong
+    polynomials = {"temperatures": [200, 1000, 3500], "low": [0.0] * 7, "high": [0.0] * 7}
+    assert check({"site": {"A*": {"nasa": polynomials, "sites": 2}}})
+    assert not check({"site": {"A*": {"nasa": {**polynomials, "low": [0.0] * 6}}}})
+    assert not check({"phase": "gas"})  # which a case says of a file of Cantera

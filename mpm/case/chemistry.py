@@ -232,7 +232,8 @@ def drop_heats(tables: dict[str, Any], kept: Collection[str] = ()) -> None:
 def mechanism_schema() -> dict[str, Any]:
     """JSON Schema of a mechanism file, for editors: the tables of `[chemistry]`, each entry complete."""
     schema = finished(Chemistry.model_json_schema())
-    del schema["properties"]["mechanism"]
+    for key in ("mechanism", "phase", "gas_reactions"):  # of a case
+        del schema["properties"][key]
     for table, keys in (("SpeciesTable", ["molar_mass"]), ("ReactionTable", ["equation"])):
         schema["$defs"][table]["required"] = keys
     return {"$schema": DRAFT, **schema, "title": "Mechanism", "description": "A mechanism file of mpm."}
