@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from mpm.physics.exposure import expose
@@ -171,3 +172,31 @@ def test_a_precursor_meets_what_suits_it() -> None:
     assert one.need == pytest.approx(2.0 + 0.01 / 1.01, rel=1e-4)
     alone = saturation(both, "B", {"B": 0.01}, {"*": 1.0}, T, N)
     assert alone.need == pytest.approx(0.01 / 1.01, rel=1e-4)
+
+
+def test_random_mechanisms_are_followed() -> None:
+    """Fails when one of forty mechanisms, rates over ten decades, orders 1/2 to 2, groups on two places, half of the reactions reversible,
+    is not followed to the end, loses places, or takes up what its stoichiometry does not allow."""
+    rng = np.random.default_rng(16)
+    for _ in range(40):
+        names = ["*", *(f"S{i}" for i in range(rng.integers(1, 5)))]
+        places = [1.0, *(float(rng.choice([1, 1, 2])) for _ in names[1:])]
+        reactions = []
+        for number in range(rng.integers(1, 8)):
+            a, b = rng.choice(len(names), 2, replace=False)
+            nu, back = {names[a]: -places[b], names[b]: places[a]}, rng.random() < 0.5
+            gases = {"A": -1.0} if rng.random() < 0.5 else {}
+            k, kb, order = 10 ** rng.uniform(-8, 2), 10 ** rng.uniform(-8, 2), rng.choice([0.5, 1.0, 2.0])
+            there = law(k, dict.fromkeys(gases, 1.0), {names[a]: places[b] if back else float(order)})
+            reactions.append(
+                surface(f"r{number}", nu, there, law(kb, {}, {names[b]: places[a]}) if back else None, gases)
+            )
+        m = mechanism(
+            *reactions,
+            species=A,
+            sites=tuple(Site(name, {}, places=held) for name, held in zip(names, places, strict=True)),
+        )
+        after = expose(m, {"A": 10 ** rng.uniform(-4, 0)}, {"*": 1.0}, T, N)
+        assert after is not None
+        assert sum(after.coverage.values()) == pytest.approx(1.0, abs=1e-6)
+        assert min(after.coverage.values()) >= 0.0

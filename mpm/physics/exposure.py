@@ -2,12 +2,14 @@
 
     d theta_k/dt = (sigma_k/n_s) sum_r nu_kr (r_f - r_b),    taken_i = -(1/n_s) int sum_r nu_ir (r_f - r_b) dt
 
-at one temperature and in a gas whose composition does not change: what reactions give off is swept away at once. Gear's formulae of
-variable order (BDF) follow it over many decades of time.
+at one temperature and in a gas whose composition does not change: what reactions give off is swept away at once. LSODA follows it over
+many decades of time (Petzold, SIAM J. Sci. Stat. Comput. 4, 136, 1983: Adams' formulae where rates are slow, Gear's where they are stiff),
+where it fails Radau's method of fifth order (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8).
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -30,8 +32,16 @@ NOTHING = 1e-9
 """Molecules per place, below which a surface takes none."""
 _RELATIVE, _ABSOLUTE = 1e-7, 1e-11
 """Tolerances of a step."""
+_LOST = 1e-2
+"""Share of the places that may be lost by rounding over many turnovers; rates are those of all places all the same."""
+_EFFORT = 20_000
+"""Evaluations of all rates at most, some tens of times what it takes."""
 _LEAST = 1e-7
 """Coverage below which powers of it are bent into a line through zero: half an order has no slope there."""
+
+
+class _BeyondReach(Exception):
+    """Following a surface takes too long."""
 
 
 class SurfaceRates:
@@ -143,30 +153,12 @@ def expose(
 
     Where reactions go back, what it takes depends on the concentrations. None where rates are beyond what can be followed.
     """
-    from scipy.integrate import solve_ivp  # which takes a while to load
-
     names = mechanism.site_names
     rates = SurfaceRates(mechanism, gas, temperature, site_density)
-    sites, whole = len(names), np.vstack([rates.change, rates.uptake])
-
-    def slopes(_: float, state: Floats) -> Floats:
-        square = np.zeros((len(whole), len(whole)))
-        square[:, :sites] = whole @ rates.slopes(state[:sites])
-        return square
-
     start = np.array([*(coverage.get(name, 0.0) for name in names), *(0.0 for _ in rates.species)])
-    with np.errstate(all="ignore"):
-        solution: Any = solve_ivp(
-            lambda _, state: whole @ rates(state[:sites]),
-            (0.0, HORIZON),
-            start,
-            method="BDF",
-            jac=slopes,
-            rtol=_RELATIVE,
-            atol=_ABSOLUTE,
-            dense_output=True,
-        )
-    if not solution.success or not np.isfinite(solution.y).all():
+    sites = len(names)
+    solution = next(filter(None, (_followed(rates, start, method) for method in ("LSODA", "Radau"))), None)
+    if solution is None:
         return None
 
     def taken_at(species: str, time: float) -> float:
@@ -176,7 +168,9 @@ def expose(
     taken = dict(zip(rates.species, map(float, end[sites:]), strict=True))
     late = dict(zip(rates.species, end[sites:] - before[sites:], strict=True))
     return Exposed(
-        coverage=dict(zip(names, map(float, np.clip(end[:sites], 0.0, 1.0)), strict=True)),
+        coverage=dict(
+            zip(names, map(float, _whole(end[:sites].clip(0.0), start[:sites].sum())), strict=True)
+        ),
         taken=taken,
         endless=frozenset(
             name for name, amount in late.items() if abs(amount) > max(ENDLESS * abs(taken[name]), NOTHING)
@@ -184,3 +178,38 @@ def expose(
         _times=solution.t,
         _taken_at=taken_at,
     )
+
+
+def _whole(theta: Floats, places: float) -> Floats:
+    """Coverages that add up to all places again, whatever a solver has lost of them."""
+    return np.asarray(theta * (places / theta.sum()))
+
+
+def _followed(rates: SurfaceRates, start: Floats, method: str) -> Any:
+    """Coverages and amounts taken (sites + gases,) from `start` to HORIZON by a method of scipy; None where it does not get there, or
+    loses places on its way by rounding."""
+    from scipy.integrate import solve_ivp  # which takes a while to load
+
+    sites, whole, left = len(rates.sites), np.vstack([rates.change, rates.uptake]), iter(range(_EFFORT))
+
+    def change(_: float, state: Floats) -> Floats:
+        if next(left, None) is None:
+            raise _BeyondReach
+        return np.asarray(whole @ rates(_whole(state[:sites], places)))
+
+    def slopes(_: float, state: Floats) -> Floats:
+        square = np.zeros((len(whole), len(whole)))
+        square[:, :sites] = whole @ rates.slopes(state[:sites])
+        return square
+
+    places = float(start[:sites].sum())
+    options = {"jac": slopes, "rtol": _RELATIVE, "atol": _ABSOLUTE, "dense_output": True}
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # LSODA says there why it gives up
+            solution: Any = solve_ivp(change, (0.0, HORIZON), start, method=method, **options)
+    except (_BeyondReach, ArithmeticError, ValueError):
+        return None
+    end = solution.y[:, -1]
+    kept = abs(end[:sites].sum() - places) < _LOST
+    return solution if solution.success and np.isfinite(end).all() and kept else None
