@@ -126,6 +126,61 @@ def test_net_rates_of_the_solver_are_canteras(file: str, phase: str, temperature
         assert ours.gross == pytest.approx(theirs.sum(axis=0), rel=1e-10)
 
 
+ALL_AT_ONCE = """
+units: {length: cm, quantity: mol, activation-energy: kJ/mol}
+phases:
+- name: gas
+  thermo: ideal-gas
+  species: [{gri30.yaml/species: [H2, O2, CH4, AR]}]
+- name: solid
+  thermo: fixed-stoichiometry
+  species: [B]
+- name: s
+  thermo: ideal-surface
+  species: [P, H(S), O(S), OO(S)]
+  kinetics: surface
+  reactions: all
+  Motz-Wise: true
+  site-density: 2.7e-9
+  adjacent-phases: [gas, solid]
+  state: {T: 900.0, coverages: {H(S): 1.0}}
+species:
+- {name: P, composition: {}, thermo: {model: constant-cp, h0: 0.0 J/mol, s0: 0.0 J/mol/K}}
+- {name: H(S), composition: {H: 1}, thermo: {model: constant-cp, T0: 400 K, h0: -40 kJ/mol, s0: 9 J/mol/K, cp0: 12 J/mol/K}}
+- {name: O(S), composition: {O: 1}, thermo: {model: constant-cp, h0: -100 kJ/mol, s0: 20 J/mol/K, cp0: 20 J/mol/K}}
+- {name: OO(S), composition: {O: 2}, sites: 2, thermo: {model: constant-cp, h0: -90 kJ/mol, s0: 60 J/mol/K}}
+- {name: B, composition: {C: 1}, thermo: {model: constant-cp, h0: 3 kJ/mol, s0: 6 J/mol/K},
+   equation-of-state: {model: constant-volume, density: 2.2 g/cm^3}}
+reactions:
+- {equation: H2 + 2 P <=> 2 H(S), sticking-coefficient: {A: 0.1, b: 0.2, Ea: 5}}
+- {equation: O2 + 2 P <=> OO(S), sticking-coefficient: {A: 2.0, b: -0.3, Ea: 0}, Motz-Wise: false,
+   coverage-dependencies: {H(S): {a: 0.3, m: 0.5, E: 4}}}
+- {equation: OO(S) <=> 2 O(S), rate-constant: {A: 1.0e+12, b: 0.1, Ea: 60}, coverage-dependencies: {O(S): [0.0, 0.0, -8.0]}}
+- {equation: B + 4 H(S) <=> CH4 + 4 P, rate-constant: {A: 1.0e+36, b: 0.0, Ea: 20}}
+- {equation: 2 O(S) + H2 => O2 + 2 P + H2, rate-constant: {A: 1.0e+22, b: 0.5, Ea: 10}, orders: {O(S): 1.5, H2: 0.5, H(S): 0.25},
+   nonreactant-orders: true}
+"""
+
+
+def test_all_that_a_reaction_of_cantera_may_have(tmp_path: Path) -> None:
+    """Motz and Wise of the phase and of one reaction, a sticking coefficient whose A is above 1, coverages in reversible reactions, kinds
+    that hold two places, a film that is used up, orders of what is no reactant, reference temperatures. To 1e-10, as those above."""
+    (tmp_path / "s.yaml").write_text(ALL_AT_ONCE)
+    surface = ct.Interface(str(tmp_path / "s.yaml"), "s")
+    mechanism = case_of(str(tmp_path / "s.yaml")).mechanism
+    assert mechanism.site_names[0] == "H(S)" and mechanism.films[0].density == pytest.approx(2200.0)
+    for T in (400.0, 900.0):
+        gas, amounts, coverages, theirs = states(surface, T, 20)
+        density = np.full(20, surface.site_density * 1e3)
+        table = RateTable(mechanism, mechanism.surface_reactions, mechanism.species_names, density)
+        table.heat_to(T)
+        order = [gas.species_index(name) for name in mechanism.species_names]
+        places = [surface.species_index(name) for name in mechanism.site_names]
+        ours = table.rates(table.gas_part(amounts[order]), coverages[places])
+        assert (np.abs(ours.net - (theirs[0] - theirs[1])) <= 1e-10 * theirs.sum(axis=0)).all()
+        assert ours.gross == pytest.approx(theirs.sum(axis=0), rel=1e-10)
+
+
 AREA = 1e4  # [1/m] of surface per volume of gas
 
 
@@ -344,6 +399,11 @@ CARRIED = "H2 + 2 PT(S) => 2 H(S)"
         (
             "{equation: H2 + 2 PT(S) => 2 H(S), sticking-coefficient: {A: 2.0, b: 0, Ea: 0}}",
             "reaction.R1.sticking: found 2.0",
+        ),
+        (
+            "{equation: H2 + 2 PT(S) => 2 H(S), sticking-coefficient: {A: 0.5, b: 0, Ea: 0}, Motz-Wise: true, "
+            "coverage-dependencies: {H(S): {a: 0, m: 0, E: 1.0e3}}}",
+            "whose sticking coefficient depends on coverage within the correction of Motz and Wise",
         ),
         (
             "{equation: B + H2 + 2 PT(S) => B + 2 H(S), rate-constant: {A: 1 m^5/mol^2/s, b: 0, Ea: 0}}",

@@ -58,6 +58,11 @@ def reaction_table(reaction: Any, where: str, kinds: Kinds) -> tuple[Table, list
         else _arrhenius(reaction.rate, of, label)
     )
     if coverage := _coverage(reaction.rate, label):
+        if "motz_wise" in table:
+            raise Refused(
+                f"{label}, whose sticking coefficient depends on coverage within the correction of Motz and Wise",
+                "one of the two",
+            )
         table["coverage"] = coverage
     return table, list(dict.fromkeys((*left, *right, *orders, *coverage)))
 
