@@ -165,3 +165,30 @@ def test_a_case_that_is_no_surface(capsys: pytest.CaptureFixture[str], tmp_path:
     report = json.loads(printed([str(path), "--json"], capsys))
     assert "site_density" not in report and "per_site" not in report["reactions"]["tma"]["forward"]
     assert "0.9 m/s" in printed([str(path)], capsys)
+
+
+CANTERA = ["ptcombust.yaml", "--phase", "Pt_surf", "--set", "gas_reactions=false", "--temperature", "900 K"]
+
+
+def test_a_file_of_cantera(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when constants per site differ from Cantera's by more than 1e-9, heats of reaction by more than 1 J/mol, the places are not
+    those of the phase, or the mechanism file written by -o has other constants."""
+    ct = pytest.importorskip("cantera")
+    report = json.loads(printed([*CANTERA, "--json"], capsys))
+    surface = ct.Interface("ptcombust.yaml", "Pt_surf")
+    surface.TP = surface.adjacent["gas"].TP = 900.0, ct.one_atm
+    surface.coverages = {"PT(S)": 1.0}  # where no constant depends on the coverage
+    assert report["site_density"] == pytest.approx(surface.site_density * 1e3)
+    theirs = zip(surface.reactions(), surface.forward_rate_constants, surface.delta_enthalpy, strict=True)
+    for own, (reaction, constant, heat) in zip(report["reactions"].values(), theirs, strict=True):
+        kmol = 1e3 ** reaction.rate_coeff_units.dimension("quantity")
+        assert own["forward"]["per_site"] == pytest.approx(constant * kmol, rel=1e-9), own["equation"]
+        assert own["heat"] == pytest.approx(heat / 1e3, abs=1.0)
+    path = tmp_path / "pt.toml"
+    printed([*CANTERA, "-o", str(path)], capsys)
+    density = f"material.glass_beads.site_density={report['site_density']!r} mol/m^2"
+    back = json.loads(printed([str(path), "--json", "--temperature", "900 K", "--set", density], capsys))
+    for key, reaction in report["reactions"].items():
+        for way in ("forward", "backward"):
+            expected = reaction.get(way, {}).get("per_site")
+            assert back["reactions"][key].get(way, {}).get("per_site") == pytest.approx(expected)

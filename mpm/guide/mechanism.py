@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mpm.case.cantera_file import is_cantera
+from mpm.case.cantera_file import cantera_site_density, is_cantera
 from mpm.case.case import Case, build_case, load_case
 from mpm.case.kinds import MECHANISM, kind_of_tables
 from mpm.case.names import case_file
@@ -21,10 +21,15 @@ BARE = {
     "layer": [{"name": "powder", "height": "1 mm", "cells": 1, "material": "glass_beads"}],
 }
 """Geometry of the case that a mechanism alone stands in: solids on which its places are counted."""
+OWN = ("species", "site", "film", "reaction", "reference_pressure", "gas_reactions")
+"""Keys of a mechanism, which may be typed here without the table [chemistry] in front."""
 
 
 def case_with(source: str, settings: Mapping[str, Any], phase: str | None, temperature: str | None) -> Case:
-    """The case that is meant, or one around a mechanism alone, whose solids are the built-in glass beads. Raises InputError."""
+    """The case that is meant, or one around a mechanism alone, whose solids are the built-in glass beads. Raises InputError.
+
+    They have as many places as a file of Cantera gives its phase.
+    """
     overrides = dict(settings)
     if phase is not None:
         overrides["chemistry.phase"] = phase
@@ -36,13 +41,19 @@ def case_with(source: str, settings: Mapping[str, Any], phase: str | None, tempe
             accepted = f"a case, a mechanism ({', '.join(built_in_files('mechanisms'))}), or the path of a file of either"
             raise InputError.at(source, "", "no such file", accepted, given=source, known=known)
         return load_case(source, overrides)
-    own = ("species.", "site.", "film.", "reaction.")  # as keys stand in its file
     overrides = {
-        f"chemistry.{key}" if key.startswith(own) else key: value for key, value in overrides.items()
+        f"chemistry.{key}" if key.split(".")[0] in OWN else key: value for key, value in overrides.items()
     }
     still = {"gamma": 0.0, "bed_velocity": "0 m/s"}
-    data = {"geometry": BARE, "motion": still, "chemistry": {"mechanism": source}}
-    return build_case(data, overrides, Path.cwd(), source)
+    chemistry = {"mechanism": source, **({} if phase is None else {"phase": phase})}
+    data: dict[str, Any] = {"geometry": BARE, "motion": still, "chemistry": chemistry}
+    if is_cantera(source):
+        data["energy"] = {}  # whose heats are read then: such a file has those of all
+    case = build_case(data, overrides, Path.cwd(), source)
+    density = cantera_site_density(chemistry, Path.cwd())
+    if density is None or "site_density" in case.typed("material.glass_beads"):
+        return case
+    return case.with_({"material.glass_beads.site_density": f"{density!r} mol/m^2"})
 
 
 def _is_mechanism(source: str) -> bool:
@@ -152,7 +163,8 @@ def _bend(bend: Mapping[str, float]) -> str:
     """The factor 10^(a theta) theta^m exp(-E theta/(R T)) without what is 1."""
     factors = [f"10^({bend['a']:g} theta)"] if bend["a"] else []
     factors += [f"theta^{bend['m']:g}"] if bend["m"] else []
-    factors += [f"exp(-{number(bend['E'] / 1e3, 'kJ/mol')} theta/(R T))"] if bend["E"] else []
+    sign = "-" if bend["E"] > 0.0 else ""
+    factors += [f"exp({sign}{number(abs(bend['E']) / 1e3, 'kJ/mol')} theta/(R T))"] if bend["E"] else []
     return "times " + " ".join(factors) if factors else "unchanged"
 
 
