@@ -42,7 +42,9 @@ class Surface:
 
     def concentrations(self, pressures: dict[str, float]) -> Floats:
         """[mol/m3] of gases at `pressures` [Pa], the others absent."""
-        return np.array([pressures.get(name, 0.0) / GAS_CONSTANT / self.T for name in self.mechanism.species_names])
+        return np.array(
+            [pressures.get(name, 0.0) / GAS_CONSTANT / self.T for name in self.mechanism.species_names]
+        )
 
     def exposed(self, time: float, steps: int = 200, **pressures: float) -> dict[str, Floats]:
         """Coverages after `time` [s]: implicit steps, all and in half the number, extrapolated to none."""
@@ -99,8 +101,8 @@ def initial_sticking(temperature: Floats) -> Floats:
 
 
 def test_water_reacts_as_fast_as_measured() -> None:
-    """Fails when adsorption, desorption or release of methane is off: sticking of table 1 of Aguinsky et al. within the scatter about its own
-    Arrhenius line (12 %), ranges of Arts et al. at the temperatures where both agree, and the activation energies that they print."""
+    """Fails when adsorption, desorption or release of methane is off: sticking of table 1 of Aguinsky et al. within the scatter about its
+    own Arrhenius line (12 %), ranges of Arts et al. at the temperatures where both agree, and the activation energies that they print."""
     found = initial_sticking(AGUINSKY)
     np.testing.assert_allclose(found, [5.0e-5, 1.2e-4, 1.9e-4], rtol=0.12)
     assert 0.8e-4 < found[1] < 2.0e-4 and 0.9e-4 < found[2] < 2.5e-4
@@ -138,7 +140,9 @@ def test_soft_saturation_is_that_of_aldsim() -> None:
     mechanism = shipped("alumina_soft")
     for time, coverage in curve.items():
         surface = Surface(mechanism, 400.0, 1e19 / AVOGADRO)
-        surface.theta[:, 0] = [0.8 if s == "OH" else 0.2 if s == "OH_slow" else 0.0 for s in mechanism.site_names]
+        surface.theta[:, 0] = [
+            0.8 if s == "OH" else 0.2 if s == "OH_slow" else 0.0 for s in mechanism.site_names
+        ]
         left = surface.exposed(time, TMA=10.0)
         assert 1.0 - left["OH"][0] - left["OH_slow"][0] == pytest.approx(coverage, abs=1e-3)
 
@@ -161,8 +165,8 @@ def temperature_of_growth(**chemistry: Any) -> float:
 
 
 def test_onset_of_growth_follows_the_second_barrier() -> None:
-    """Fails when the second ethane does not rule the onset: the source finds no growth below 25 degC without slow elimination, and that 0.10 eV
-    more on that barrier move the onset by roughly 40 degC."""
+    """Fails when the second ethane does not rule the onset: the source finds no growth below 25 degC without slow elimination, and that
+    0.10 eV more on that barrier move the onset by roughly 40 degC."""
     onset = temperature_of_growth()
     assert onset < 25.0 + CELSIUS + 20.0
     harder = temperature_of_growth(reaction={"water": {"Ea": f"{0.82 * EV} J/mol"}})
@@ -216,8 +220,8 @@ def test_energies_of_zirconia_are_those_of_the_surface() -> None:
 
 
 def test_a_cycle_of_zirconia() -> None:
-    """Fails when the doses of the source (2 s of 2 Pa ZrCl4, then of 4 Pa water, 180 to 300 degC) do not saturate with two chlorides per zirconium
-    and give the surface back, or when HCl in the gas does not hold the second half up."""
+    """Fails when the doses of the source (2 s of 2 Pa ZrCl4, then of 4 Pa water, 180 to 300 degC) do not saturate with two chlorides per
+    zirconium and give the surface back, or when HCl in the gas does not hold the second half up."""
     T = np.array([180.0, 240.0, 300.0]) + CELSIUS
     surface = Surface(shipped("zirconia"), T, 6e18 / AVOGADRO)
     surface.exposed(2.0, ZrCl4=2.0)
