@@ -1,5 +1,8 @@
 """The mechanisms that come with mpm, each against what its paper prints, by mpm's own kinetics."""
 
+import re
+import tomllib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -251,3 +254,45 @@ def test_silicon_grows_as_its_rate_law_says() -> None:
             concentration = 1e3 * p_silane / GAS_CONSTANT / T
             law = 1e-2 * k * concentration / (1.0 + 0.034 * p_hydrogen + silane * p_silane)
             np.testing.assert_allclose(rate, law, rtol=1e-3)
+
+
+# --- the page about them ---
+
+EXAMPLE_PARTS = """
+[species.A]
+molar_mass = "40 g/mol"
+elements = { Ar = 1 }
+[species.B]
+molar_mass = "4 g/mol"
+elements = { He = 1 }
+[species.A2]
+molar_mass = "80 g/mol"
+elements = { Ar = 2 }
+[species.AB]
+molar_mass = "44 g/mol"
+elements = { Ar = 1, He = 1 }
+[site."*"]
+[site."A*"]
+elements = { Ar = 1 }
+[site."B*"]
+elements = { He = 1 }
+[film.F]
+elements = { Ar = 1 }
+"""
+
+
+def test_examples_of_the_page_are_what_it_says() -> None:
+    """Fails when an example of docs/kinetics.md is refused, or its Langmuir isotherms are not those beside them."""
+    text = (Path(__file__).parent.parent / "docs" / "kinetics.md").read_text(encoding="utf-8")
+    block = re.search(r"```toml\n(\[reaction.*?)```", text, re.DOTALL)
+    assert block is not None
+    tables = {**tomllib.loads(EXAMPLE_PARTS), **tomllib.loads(block[1])}
+    T, pressure = 400.0, 500.0
+    for key, power, gas in (("langmuir", 1.0, "A"), ("dissociative", 0.5, "A2")):
+        alone = {**tables, "reaction": {key: tables["reaction"][key]}}
+        surface = Surface(shipped("inline", **alone), T, 1e-6)
+        reaction = surface.mechanism.surface_reactions[0]
+        K = float(surface.mechanism.equilibrium_constant(reaction, T))
+        x = (K * pressure / GAS_CONSTANT / T) ** power
+        assert surface.exposed(100.0, **{gas: pressure})["A*"][0] == pytest.approx(x / (1.0 + x), rel=1e-6)
+    assert len(shipped("inline", **tables).reactions) == len(tables["reaction"]) == 8
