@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -43,14 +44,14 @@ class Surface:
         self.theta = np.zeros((len(mechanism.site_names), self.T.size))
         self.theta[0] = 1.0
 
-    def concentrations(self, pressures: dict[str, float]) -> Floats:
+    def concentrations(self, pressures: Mapping[str, float]) -> Floats:
         """[mol/m3] of gases at `pressures` [Pa], the others absent."""
         return np.array(
             [pressures.get(name, 0.0) / GAS_CONSTANT / self.T for name in self.mechanism.species_names]
         )
 
-    def exposed(self, time: float, steps: int = 200, **pressures: float) -> dict[str, Floats]:
-        """Coverages after `time` [s]: implicit steps, all and in half the number, extrapolated to none."""
+    def exposed(self, time: float, pressures: Mapping[str, float], steps: int = 200) -> dict[str, Floats]:
+        """Coverages after `time` [s] under gases at `pressures` [Pa]: implicit steps, all and in half the number, extrapolated to none."""
         gas, ends = self.concentrations(pressures), []
         for n in (steps, 2 * steps):
             theta = self.theta
@@ -61,7 +62,7 @@ class Surface:
         self.theta /= self.theta.sum(axis=0)
         return dict(zip(self.mechanism.site_names, self.theta.copy(), strict=True))
 
-    def events(self, time: float, **pressures: float) -> dict[str, Floats]:
+    def events(self, time: float, pressures: Mapping[str, float]) -> dict[str, Floats]:
         """Mean rates of events [mol/m2/s] in one implicit step of `time` [s]."""
         rates, _ = self.kinetics.rates(self.concentrations(pressures), self.theta, time)
         return dict(zip((reaction.key for reaction in self.kinetics.reactions), rates, strict=True))
@@ -76,12 +77,15 @@ class Surface:
 def test_atoms_and_places_balance(name: str) -> None:
     """Fails when an event of any reaction makes or loses an atom or a place on the surface."""
     mechanism = shipped(name)
-    parts = {part.name: part for part in (*mechanism.species, *mechanism.sites, *mechanism.films)}
+    atoms_of = {
+        **{species.name: species.elements for species in mechanism.species},
+        **{solid.name: solid.elements for solid in (*mechanism.sites, *mechanism.films)},
+    }
     assert mechanism.name == name
     for reaction in mechanism.reactions:
         atoms: dict[str, float] = {}
         for part, nu in reaction.changes.items():
-            for element, count in parts[part].elements.items():
+            for element, count in atoms_of[part].items():
                 atoms[element] = atoms.get(element, 0.0) + nu * count
         assert max(map(abs, atoms.values())) < 1e-12, reaction
         if isinstance(reaction, SurfaceReaction):
@@ -100,7 +104,7 @@ def initial_sticking(temperature: Floats) -> Floats:
     surface = Surface(shipped("alumina_thermal"), temperature, 1.0 / SITE_AREA / AVOGADRO)
     surface.theta[:] = np.array([[0.0], [1.0], [0.0]])
     pressure = 1e-3  # Pa: a thousandth of the sites in a second
-    return surface.events(1.0, H2O=pressure)["methane"] / surface.flux("H2O", pressure)
+    return surface.events(1.0, {"H2O": pressure})["methane"] / surface.flux("H2O", pressure)
 
 
 def test_water_reacts_as_fast_as_measured() -> None:
@@ -119,7 +123,7 @@ def test_adsorbed_water_leaves_again() -> None:
     """Fails when the complex does not choose between water and methane as barriers of 0.74 and 0.91 eV with one prefactor say."""
     surface = Surface(shipped("alumina_thermal"), AGUINSKY, 5e-6)
     surface.theta[:] = np.array([[0.0], [0.0], [1.0]])
-    left = surface.exposed(0.1, steps=400)
+    left = surface.exposed(0.1, {}, steps=400)
     reacted = 1.0 / (1.0 + np.exp(0.17 * EV / GAS_CONSTANT / AGUINSKY))
     np.testing.assert_allclose(left["OH"], reacted, rtol=1e-3)
     np.testing.assert_allclose(left["OH"] + left["OAl(CH3)2"], 1.0, atol=1e-3)
@@ -129,7 +133,7 @@ def test_sticking_of_tma_is_that_of_the_surface() -> None:
     """Fails when TMA takes its sites faster or slower than (4 +- 1)e-3 of the collisions do (Vandalon and Kessels 2016)."""
     places = 1.0 / SITE_AREA / AVOGADRO
     surface = Surface(shipped("alumina_thermal"), 300.0 + CELSIUS, places)
-    sticking = surface.events(1e-9, TMA=1.0)["tma"] / surface.flux("TMA", 1.0)
+    sticking = surface.events(1e-9, {"TMA": 1.0})["tma"] / surface.flux("TMA", 1.0)
     assert 3e-3 < sticking[0] < 5e-3
 
 
@@ -146,7 +150,7 @@ def test_soft_saturation_is_that_of_aldsim() -> None:
         surface.theta[:, 0] = [
             0.8 if s == "OH" else 0.2 if s == "OH_slow" else 0.0 for s in mechanism.site_names
         ]
-        left = surface.exposed(time, TMA=10.0)
+        left = surface.exposed(time, {"TMA": 10.0})
         assert 1.0 - left["OH"][0] - left["OH_slow"][0] == pytest.approx(coverage, abs=1e-3)
 
 
@@ -156,7 +160,7 @@ def test_soft_saturation_is_that_of_aldsim() -> None:
 def test_diethylzinc_saturates_within_a_twentieth_of_a_second() -> None:
     """Fails when adsorption or the first ethane is slow where the source has a saturated surface after 0.05 s of 20 Pa."""
     surface = Surface(shipped("zinc_oxide"), [300.0, 375.0, 450.0], 1.0 / 0.18e-18 / AVOGADRO)
-    assert surface.exposed(0.05, DEZ=20.0)["OZnC2H5"].min() > 0.99
+    assert surface.exposed(0.05, {"DEZ": 20.0})["OZnC2H5"].min() > 0.99
 
 
 def temperature_of_growth(**chemistry: Any) -> float:
@@ -164,7 +168,7 @@ def temperature_of_growth(**chemistry: Any) -> float:
     T = np.linspace(240.0, 400.0, 161)
     surface = Surface(shipped("zinc_oxide", **chemistry), T, 1.0 / 0.18e-18 / AVOGADRO)
     surface.theta[:] = np.array([[0.0], [0.0], [1.0], [0.0]])
-    return float(np.interp(0.5, surface.exposed(0.7, H2O=20.0)["OH"], T))
+    return float(np.interp(0.5, surface.exposed(0.7, {"H2O": 20.0})["OH"], T))
 
 
 def test_onset_of_growth_follows_the_second_barrier() -> None:
@@ -196,10 +200,10 @@ def test_hydrogen_chloride_takes_its_share_of_the_sites() -> None:
     it (equations 15, 16 and 19 of Yanguas-Gil et al.)."""
     surface = Surface(shipped("titania"), 473.0, 1.0 / 0.24e-18 / AVOGADRO)
     ratio = 0.1 * surface.flux("HCl", 1.0) / surface.flux("TiCl4", 1.0)
-    full = surface.exposed(5.0, steps=800, TiCl4=10.0, HCl=10.0)
+    full = surface.exposed(5.0, {"TiCl4": 10.0, "HCl": 10.0}, steps=800)
     np.testing.assert_allclose(full["OTiCl3"] + full["OH*HCl"], 1.0, atol=1e-3)
     np.testing.assert_allclose(full["OH*HCl"] / full["OTiCl3"], ratio, rtol=5e-3)
-    assert surface.exposed(5.0, H2O=10.0)["OH"][0] == pytest.approx(1.0, abs=1e-3)
+    assert surface.exposed(5.0, {"H2O": 10.0})["OH"][0] == pytest.approx(1.0, abs=1e-3)
 
 
 # --- zirconia ---
@@ -227,15 +231,15 @@ def test_a_cycle_of_zirconia() -> None:
     zirconium and give the surface back, or when HCl in the gas does not hold the second half up."""
     T = np.array([180.0, 240.0, 300.0]) + CELSIUS
     surface = Surface(shipped("zirconia"), T, 6e18 / AVOGADRO)
-    surface.exposed(2.0, ZrCl4=2.0)
-    assert surface.exposed(2.0)["ZrO2ZrCl2"].min() > 0.99
+    surface.exposed(2.0, {"ZrCl4": 2.0})
+    assert surface.exposed(2.0, {})["ZrO2ZrCl2"].min() > 0.99
     chlorinated = surface.theta.copy()
-    assert surface.exposed(2.0, H2O=4.0)["Zr(OH)2"].min() > 0.99
+    assert surface.exposed(2.0, {"H2O": 4.0})["Zr(OH)2"].min() > 0.99
     surface.theta[:] = chlorinated
-    free = surface.exposed(1e-3, H2O=4.0)["Zr(OH)2"]
+    free = surface.exposed(1e-3, {"H2O": 4.0})["Zr(OH)2"]
     surface.theta[:] = chlorinated
-    held = surface.exposed(1e-3, H2O=4.0, HCl=400.0)["Zr(OH)2"]
-    assert (held < 0.9 * free).all()
+    held = surface.exposed(1e-3, {"H2O": 4.0, "HCl": 4.0})["Zr(OH)2"]
+    assert held[0] / free[0] == pytest.approx(0.25, abs=0.02) and (held < 0.6 * free).all()
 
 
 # --- silicon ---
@@ -249,8 +253,8 @@ def test_silicon_grows_as_its_rate_law_says() -> None:
     for p_silane, p_hydrogen in ((0.01, 0.0), (5.0, 0.0), (1.0, 20.0), (20.0, 60.0)):  # kPa
         surface = Surface(shipped("silicon"), T, 1e-5)
         for _ in range(2):
-            surface.exposed(10.0, steps=5, SiH4=1e3 * p_silane, H2=1e3 * p_hydrogen)
-            rate = surface.events(10.0, SiH4=1e3 * p_silane, H2=1e3 * p_hydrogen)["deposition"]
+            surface.exposed(10.0, {"SiH4": 1e3 * p_silane, "H2": 1e3 * p_hydrogen}, steps=5)
+            rate = surface.events(10.0, {"SiH4": 1e3 * p_silane, "H2": 1e3 * p_hydrogen})["deposition"]
             concentration = 1e3 * p_silane / GAS_CONSTANT / T
             law = 1e-2 * k * concentration / (1.0 + 0.034 * p_hydrogen + silane * p_silane)
             np.testing.assert_allclose(rate, law, rtol=1e-3)
@@ -294,5 +298,5 @@ def test_examples_of_the_page_are_what_it_says() -> None:
         reaction = surface.mechanism.surface_reactions[0]
         K = float(surface.mechanism.equilibrium_constant(reaction, T))
         x = (K * pressure / GAS_CONSTANT / T) ** power
-        assert surface.exposed(100.0, **{gas: pressure})["A*"][0] == pytest.approx(x / (1.0 + x), rel=1e-6)
+        assert surface.exposed(100.0, {gas: pressure})["A*"][0] == pytest.approx(x / (1.0 + x), rel=1e-6)
     assert len(shipped("inline", **tables).reactions) == len(tables["reaction"]) == 8
