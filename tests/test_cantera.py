@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from mpm.advice.caveats import site_density_caveats
+from mpm.advice.caveats import polynomial_caveats, site_density_caveats
 from mpm.case.case import Case, load_case
+from mpm.case.settings import parse_settings
 from mpm.cli import main
 from mpm.errors import InputError
 from mpm.physics.mechanism import Mechanism
@@ -355,6 +356,15 @@ def test_single_numbers_can_be_set() -> None:
     assert load_case(other.to_dict()) == other
 
 
+def test_a_file_of_cantera_can_be_set_in_a_shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By its name, wherever the user stands; one that lies there is meant first."""
+    monkeypatch.chdir(tmp_path)
+    typed = ["chemistry.mechanism=sofc.yaml", "chemistry.phase=metal_surface"]
+    assert case_of("ptcombust.yaml").with_(parse_settings(typed)).mechanism.site_names[0] == "(m)"
+    Path("sofc.yaml").write_text("")
+    assert parse_settings(typed)["chemistry.mechanism"] == str(tmp_path / "sofc.yaml")
+
+
 SURFACE = """
 phases:
 - name: gas
@@ -480,6 +490,17 @@ def test_another_site_density_than_the_files_is_told() -> None:
     )
     assert site_density_caveats(case.with_({"material.glass_beads.site_density": "2.7063e-5 mol/m^2"})) == []
     assert site_density_caveats(load_case("single_zone")) == []
+
+
+def test_polynomials_beyond_their_range_are_told() -> None:
+    """Fails when a way back is read off a polynomial where nobody fitted it, in silence; or a name is told that no equilibrium reads."""
+    case = case_of("ptcombust.yaml")
+    assert polynomial_caveats(case) == []
+    (line,) = polynomial_caveats(case.with_({"gas.temperature": "250 K"}))
+    assert (
+        line
+        == "nasa polynomials of PT(S), H(S), H2O(S), OH(S), O(S) are those of 300 to 3000 K and are continued to 250 K"
+    )
 
 
 def test_a_new_case_of_a_file_of_cantera_is_that_case(

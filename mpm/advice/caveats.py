@@ -156,6 +156,25 @@ def site_density_caveats(case: Case) -> list[str]:
     ]
 
 
+def polynomial_caveats(case: Case) -> list[str]:
+    """Polynomials of enthalpy and entropy that the case reads beyond the temperatures that they were fitted to."""
+    chemistry, found = case.chemistry, dict[tuple[float, float], list[str]]()
+    coldest, hottest = case.temperatures[0], case.temperatures[-1]
+    for table in (chemistry.species, chemistry.site, chemistry.film):
+        for name, substance in table.items():
+            read = case.energy is not None or name in case.mechanism.equilibrated
+            if substance.nasa is None or not read:
+                continue
+            lowest, _, highest = substance.nasa.temperatures
+            if coldest < lowest or hottest > highest:
+                found.setdefault((lowest, highest), []).append(name)
+    at = f"{coldest:g} K" if coldest == hottest else f"{coldest:g} to {hottest:g} K"
+    return [
+        f"nasa polynomials of {', '.join(names)} are those of {lowest:g} to {highest:g} K and are continued to {at}"
+        for (lowest, highest), names in found.items()
+    ]
+
+
 def steady_caveats(case: Case) -> list[str]:
     """Inlets that dose for a time only: the steady state is that after the last window, without them."""
     if case.fidelity != "steady":

@@ -36,7 +36,11 @@ def _where_typed(key: str, value: Any) -> Any:
     """A path typed in a shell is relative to where the user stands; a name stays one, unless there is a file of it."""
     if key not in PATHS or not isinstance(value, str):
         return value
-    looks_like_a_name = not Path(value).suffix and len(Path(value).parts) == 1
+    of_cantera = key == "chemistry.mechanism" and Path(value).suffix in (
+        ".yaml",
+        ".yml",
+    )  # which has files of its own
+    looks_like_a_name = (of_cantera or not Path(value).suffix) and len(Path(value).parts) == 1
     found = file_in(Path.cwd(), key, value)
     return found if found != value or looks_like_a_name else str(Path.cwd() / value)
 
