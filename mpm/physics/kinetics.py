@@ -139,9 +139,9 @@ class SurfaceKinetics:
             out = mean = np.einsum("ksn,sn->kn", inverse, theta)
             out_q = mean_q = span * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, out[self.site])
             out_theta = mean_theta = inverse
-        values = np.stack(
-            [self.constant[r] * concentration[g] * mean[s] for r, (g, s) in enumerate(self._pairs())]
-        )
+        values = np.empty((count, concentration.shape[1]))
+        for r, (g, s) in enumerate(self._pairs()):
+            values[r] = self.constant[r] * concentration[g] * mean[s]
         slopes = np.zeros((count, *concentration.shape))
         out_c = np.zeros((k, *concentration.shape))
         values_theta = np.zeros((count, *theta.shape))

@@ -175,7 +175,8 @@ class FluxAssembler:
 
     def _outflow(self, from_behind: Floats, from_ahead: Floats, ports: list[PortFlux]) -> Floats:
         strip = self.strip
-        outflow = np.bincount(strip.faces.behind, from_behind, len(strip.cell))
+        # of a strip of one cell, which has no face, a bincount counts in integers
+        outflow = np.bincount(strip.faces.behind, from_behind, len(strip.cell)).astype(float)
         outflow += np.bincount(strip.faces.ahead, from_ahead, len(strip.cell))
         for port in ports:
             np.add.at(outflow, port.cells, port.out)
