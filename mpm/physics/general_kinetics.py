@@ -122,7 +122,9 @@ class GeneralKinetics:
         unit = np.broadcast_to(np.eye(k)[:, :solids, None], (k, solids, n))
         no_rates = np.zeros((len(self.reactions), c + solids, n))
         none = np.zeros((k, c, n))
-        return Step(np.zeros((k, n)), no_rates[:, 0], none, no_rates[:, :c], unit, no_rates[:, c:])
+        return Step(
+            np.zeros((k, n)), np.zeros((len(self.reactions), n)), none, no_rates[:, :c], unit, no_rates[:, c:]
+        )
 
     # --- one step ---
 

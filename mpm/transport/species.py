@@ -41,13 +41,10 @@ Operators = list[FluxOperator]  # of one velocity field, one per species
 NEWTON_LIMIT = 30
 # backward-error floor, relative to the sum of |diagonal C|: a residual below that is rounding, and accepted
 ROUNDING = float(np.finfo(float).eps)
-UNDERSHOOT = (
-    1e-15  # of the largest concentration, feeds included: a step is accepted only when nothing lies below
-)
+UNDERSHOOT = 1e-15  # of the largest concentration or feed: no accepted step has anything lower
 IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 HALVINGS = 6
-# residual below which Newton's steps have no need of balanced cells; where a cell takes long, as general rate laws do, the first balance
-# has most of the gain
+# residual below which steps need no balanced cells; of general rate laws, which take long in a cell, the first balance has most of the gain
 BALANCED = 1e-4
 NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
 
@@ -250,18 +247,21 @@ class Transport:
         rhs = storage * old + supply
         new = possible(foreseen, old)
         new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
-        scale = max(self.ports.feed_rate, NO_FEED)
         for iteration in range(NEWTON_LIMIT):
             rates, slopes = reactions.surface.rates(new[:, cells], theta, dt)
             gas_rates, gas_slopes = reactions.gas.rates(new)
             events = reactions.events(rates, gas_rates)
-            residual = self._products(matrices, new) - rhs - reactions.made(events, slice(self.coupled))
-            size, carried = total(self.strip.comm, [np.abs(residual).sum(), np.abs(diagonal * new).sum()])
+            made = reactions.made(events, slice(self.coupled))
+            residual = self._products(matrices, new) - rhs - made
+            sums = [np.abs(residual).sum(), np.abs(diagonal * new).sum(), np.abs(made).sum()]
+            size, carried, turned = total(self.strip.comm, sums)
+            scale = max(self.ports.feed_rate, turned if reactions.start_by_themselves else 0.0, NO_FEED)
             worst = size / scale
-            lowest, highest = largest(self.strip.comm, [-new.min(initial=0.0), new.max(initial=0.0)])
-            low, most = -lowest, max(highest, self.ports.largest_feed)
+            lowest, most = largest(
+                self.strip.comm, [-new.min(initial=0.0), new.max(initial=self.ports.largest_feed)]
+            )
             accepted = max(RESIDUAL, ROUNDING * carried / scale)
-            if worst < accepted and low >= -UNDERSHOOT * most:
+            if worst < accepted and lowest <= UNDERSHOOT * most:
                 return new, events
             if not np.isfinite(worst):
                 break
@@ -273,7 +273,7 @@ class Transport:
                 new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
-            f"{worst:.3g} of the feed, lowest concentration {low:.3g} mol/m3"
+            f"{worst:.3g} of the feed, lowest concentration {-lowest:.3g} mol/m3"
         )
 
     def _balance(
