@@ -200,3 +200,23 @@ def test_random_mechanisms_are_followed() -> None:
         assert after is not None
         assert sum(after.coverage.values()) == pytest.approx(1.0, abs=1e-6)
         assert min(after.coverage.values()) >= 0.0
+
+
+def test_deposition_from_two_gases() -> None:
+    """Fails when a precursor that alone finds nothing to do is not measured beside the gas of another feed, or both are then said to be
+    needed where one is enough."""
+    both = mechanism(
+        surface(
+            "growth",
+            {},
+            law(3.0, {"A": 1.0, "B": 1.0}, {"*": 1.0}),
+            gases={"A": -1.0, "B": -2.0},
+            film={"F": 1.0},
+        ),
+        species=(*A, Species("B", 0.02, {})),
+        sites=(EMPTY,),
+    )
+    one = saturation(both, "B", {"B": 0.01}, {"*": 1.0}, T, N, others=[{"A": 0.5}, {"B": 7.0}])
+    assert one.beside == ("A",) and one.endless and one.need is None
+    assert one.speed == pytest.approx(2.0 * 3.0 * 0.5)
+    assert found(langmuir(0.5, 0.1), 0.01).beside == ()

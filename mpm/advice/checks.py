@@ -174,6 +174,8 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     velocity = eng.rising_velocity(case, inlet.center)
     surface = material.surface_to_volume
     numbers["species"] = species
+    if k == 0.0 and not mechanism.is_first_order:
+        return numbers  # nothing that it reacts with
     if diffusivity > 0.0:
         numbers["Pe_bed"] = eng.peclet(velocity=velocity, length=layer.height, diffusivity=diffusivity)
         numbers["Damkoehler_diffusion"] = eng.damkoehler_diffusion(

@@ -175,7 +175,7 @@ def _checked(sheet: Sheet, reactions: Mapping[str, Any]) -> None:
     if not wrong:
         sheet.add(
             "elements and places",
-            f"balance in all {len(reactions)} reactions" if reactions else "no reactions",
+            "balance in every reaction" if reactions else "no reactions",
         )
     for key, missing in wrong.items():
         found = ", ".join(f"{amount:+g} {name}" for name, amount in missing.items())
@@ -186,6 +186,8 @@ def _precursor(sheet: Sheet, inlet: str, numbers: Mapping[str, Any]) -> None:
     species = numbers["species"]
     sheet.group(f"{species} of inlet {inlet}, until nothing changes")
     sheet.add("fed at", number(numbers["concentration"], "mol/m^3"))
+    if numbers.get("beside"):
+        sheet.add("together with", ", ".join(numbers["beside"]))
     if not numbers["coverage_met"]:
         sheet.add("finds", "nothing that it reacts with")
         return

@@ -157,6 +157,8 @@ def expose(
     rates = SurfaceRates(mechanism, gas, temperature, site_density)
     start = np.array([*(coverage.get(name, 0.0) for name in names), *(0.0 for _ in rates.species)])
     sites = len(names)
+    if not start.any():  # no surface
+        return None
     solution = next(filter(None, (_followed(rates, start, method) for method in ("LSODA", "Radau"))), None)
     if solution is None:
         return None

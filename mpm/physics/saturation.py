@@ -29,7 +29,8 @@ class Saturation:
     `speed` [m/s] at which it is taken up at first, flux over concentration; `need`: molecules per place until nothing changes any more,
     None where that never comes, as with growth that does not stop and with catalysis; `lifetime` [s] of the sites, in which of what it
     takes all but 1/e has been taken; of the kind that it turns over last where several do, each by itself. `left` is the coverage in the
-    end; `endless`: whether the precursor is taken up without end, as far as that has been followed.
+    end; `endless`: whether the precursor is taken up without end, as far as that has been followed. `beside`: the gases of other feeds that
+    it is counted together with, because alone it finds nothing to do.
     """
 
     met: Mapping[str, float]
@@ -38,6 +39,7 @@ class Saturation:
     lifetime: float | None
     left: Mapping[str, float]
     endless: bool = False
+    beside: tuple[str, ...] = ()
 
 
 def saturation(
@@ -75,7 +77,13 @@ def _saturation_in_time(
     site_density: float,
     others: Iterable[Gas],
 ) -> Saturation:
+    others = tuple(others)
+    beside: tuple[str, ...] = ()
     met, after = _met(mechanism, species, gas, fresh, temperature, site_density, others)
+    if after is None:  # deposition from two gases, say
+        alone, gas = gas, together(gas, others)
+        beside = tuple(name for name in gas if name not in alone)
+        met, after = _met(mechanism, species, gas, fresh, temperature, site_density, ())
     if after is None:
         return Saturation({}, 0.0, None, None, {})
     rates = SurfaceRates(mechanism, gas, temperature, site_density)
@@ -88,7 +96,17 @@ def _saturation_in_time(
         lifetime=after.time(species, 1.0 - math.exp(-1.0)),
         left=after.coverage,
         endless=endless,
+        beside=beside,
     )
+
+
+def together(gas: Gas, others: Iterable[Gas]) -> dict[str, float]:
+    """A gas that holds what it is fed with and what other feeds hold beside it, at most."""
+    mixed = dict(gas)
+    for other in others:
+        for name, amount in other.items():
+            mixed[name] = gas[name] if name in gas else max(mixed.get(name, 0.0), amount)
+    return mixed
 
 
 def _met(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mpm.physics.exposure import expose
 from mpm.physics.reaction import Reaction, SurfaceReaction
 from mpm.report.coating import conveyed_layer
-from mpm.report.dosing import inlet_saturation
+from mpm.report.dosing import all_feeds, inlet_saturation
 from mpm.report.rateunits import orders, rate_constants, unit_of_equilibrium
 
 if TYPE_CHECKING:
@@ -119,12 +119,16 @@ def _precursors(case: Case, material: Material) -> dict[str, dict[str, Any]]:
             continue
         gas = case.feed_concentrations(inlet.mass_fractions)
         found = inlet_saturation(case, inlet, species, material)
+        concentration = gas[species]
         if case.mechanism.is_first_order:  # which counts one precursor by itself
-            gas = {species: gas[species]}
+            gas = {species: concentration}
+        elif found.beside:
+            gas = all_feeds(case, inlet)
         after = expose(case.mechanism, gas, found.met, case.gas.temperature, material.site_density)
         report[inlet.name] = {
             "species": species,
-            "concentration": gas[species],
+            "concentration": concentration,
+            "beside": list(found.beside),
             "coverage_met": {name: share for name, share in found.met.items() if share > BALANCED},
             "uptake_speed": found.speed or None,
             "molecules_per_place": found.need,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from mpm.physics.saturation import Saturation, saturation
+from mpm.physics.saturation import Saturation, saturation, together
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -88,6 +88,14 @@ def inlet_saturation(case: Case, inlet: Inlet, species: str, material: Material)
         case.gas.temperature,
         material.site_density,
         others=feeds,
+    )
+
+
+def all_feeds(case: Case, inlet: Inlet) -> dict[str, float]:
+    """Concentrations of all feeds as if they met [mol/m3], those of `inlet` as it feeds them."""
+    return together(
+        case.feed_concentrations(inlet.mass_fractions),
+        (case.feed_concentrations(i.mass_fractions) for i in case.dosing_inlets if i is not inlet),
     )
 
 

@@ -80,9 +80,9 @@ def _no_coating(case: Case) -> str:
         name for inlet in dosing if (name := case.precursor(inlet)) and not case.sites_made_by(inlet)
     ]
     if len(unchanged) == len(dosing):
-        return (
-            f"no coverage is reported: {' and '.join(dict.fromkeys(unchanged))} leaves the sites as they are"
-        )
+        names = list(dict.fromkeys(unchanged))
+        leave = "leave" if len(names) > 1 else "leaves"
+        return f"no coverage is reported: {' and '.join(names)} {leave} the sites as they are"
     return "no coverage has been reported"
 
 
