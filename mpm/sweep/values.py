@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mpm import units
+from mpm.case.ratetables import unit_text
 from mpm.errors import InputError
 
 DIGITS = 12
@@ -33,13 +34,21 @@ def si_units() -> tuple[str, ...]:
 
 @functools.lru_cache(maxsize=4096)
 def _quantity(text: str) -> tuple[float, str] | None:
-    """SI value and unit of "3.5 cm/s"; None for a word, or a dimension that no key of a case has."""
+    """SI value and unit of "3.5 cm/s"; None for a word, or a dimension that no key of a case has.
+
+    Rate and equilibrium constants have units that follow from the orders of their reaction: any of mol, m and 1/s.
+    """
     for unit in si_units():
         try:
             return units.parse(text, unit), unit
         except ValueError:
             continue
-    return None
+    try:
+        value, powers = units.in_base_units(text)
+    except ValueError:
+        return None
+    is_constant = set(powers) <= {"mol", "m", "s"} and powers.get("s", 0.0) in (-1.0, 0.0)
+    return (value, unit_text(powers)) if is_constant else None
 
 
 def to_number(value: Any) -> tuple[float | str, str]:
