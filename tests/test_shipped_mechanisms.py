@@ -206,6 +206,14 @@ def test_hydrogen_chloride_takes_its_share_of_the_sites() -> None:
     assert surface.exposed(5.0, {"H2O": 10.0})["OH"][0] == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_gas_that_only_helps_takes_the_general_solver() -> None:
+    """Fails when a reaction that does not take its gas up, such as water that frees sites of HCl, counts as one that does: the steady state
+    of titania between both its inlets was then not found."""
+    reactions = {reaction.key: reaction for reaction in shipped("titania").surface_reactions}
+    assert reactions["chloride"].is_first_order and not reactions["displacement"].is_first_order
+    assert shipped("alumina").is_first_order and not shipped("titania").is_first_order
+
+
 # --- zirconia ---
 
 

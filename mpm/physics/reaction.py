@@ -90,10 +90,11 @@ class SurfaceReaction(Reaction):
 
     @property
     def is_first_order(self) -> bool:
-        """Whether it is r = k(T) C theta of one gas and one site that it turns over, with no way back."""
+        """Whether it is r = k(T) C theta of one gas that it takes up and one site that it turns over, with no way back."""
         return (
             self.backward is None
             and self.forward.is_first_order
+            and self.nu_gas.get(self.gas, 0.0) < 0.0
             and self.nu_site.get(self.site, 0.0) < 0.0
             and all(nu > 0.0 for name, nu in self.nu_site.items() if name != self.site)
         )
