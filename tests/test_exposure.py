@@ -220,3 +220,40 @@ def test_deposition_from_two_gases() -> None:
     assert one.beside == ("A",) and one.endless and one.need is None
     assert one.speed == pytest.approx(2.0 * 3.0 * 0.5)
     assert found(langmuir(0.5, 0.1), 0.01).beside == ()
+
+
+def test_sites_that_are_made_and_hold_more() -> None:
+    """Fails when OH that water has made no longer counts because more water sits down on it, or an intermediate that only gives back the
+    sites that there were does not count at all."""
+    water = mechanism(
+        surface("makes", {"Me": -1.0, "OH": 1.0}, law(1.0, {"W": 1.0}, {"Me": 1.0}), gases={"W": -1.0}),
+        surface(
+            "sits",
+            {"OH": -1.0, "OHW": 1.0},
+            law(1.0, {"W": 1.0}, {"OH": 1.0}),
+            law(1.0, {}, {"OHW": 1.0}),
+            {"W": -1.0},
+        ),
+        species=(Species("W", 0.018, {}),),
+        sites=(Site("OH", {}), Site("Me", {}), Site("OHW", {})),
+    )
+    assert water.titrated_sites("W") == ("OH", "OHW")
+    split = mechanism(
+        surface(
+            "lands",
+            {"*": -2.0, "W2": 1.0},
+            law(1.0, {"A": 1.0}, {"*": 2.0}),
+            law(1.0, {}, {"W2": 1.0}),
+            {"A": -1.0},
+        ),
+        surface(
+            "turns",
+            {"W2": -1.0, "*": 1.0, "A*": 1.0},
+            law(1.0, {}, {"W2": 1.0}),
+            law(1.0, {}, {"*": 1.0, "A*": 1.0}),
+        ),
+        surface("grows", {"A*": -2.0, "*": 2.0}, law(1.0, {}, {"A*": 1.0}), film={"F": 2.0}),
+        species=A,
+        sites=(EMPTY, HELD, Site("W2", {}, places=2.0)),
+    )
+    assert split.titrated_sites("A") == ("W2", "A*")

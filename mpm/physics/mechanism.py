@@ -68,30 +68,32 @@ class Mechanism:
         return tuple(reaction for reaction in self.surface_reactions if reaction.consumes(species))
 
     def titrated_sites(self, species: str) -> tuple[str, ...]:
-        """The site species that the half-reactions of `species` make and do not consume: all of its making on a saturated surface.
+        """The site species that the half-reactions of `species` make and do not consume for good: all of its making on a saturated surface.
 
         Where they consume every one (OH -> X -> OH) all that they make. What they make may change further without a gas, as a molecule
-        that sits down first and reacts afterwards does: then those made in the end, if any stay. Empty where `species` leaves the sites as
-        they are, as in growth that does not stop.
+        that sits down first and reacts afterwards does: then those made in the end, unless that only gives back the sites that there were.
+        Empty where `species` leaves the sites as they are, as in growth that does not stop.
         """
         made: dict[str, None] = {}
-        used: set[str] = set()
+        there, gone = set[str](), set[str]()
         for reaction in self.half_reactions(species):
             for sign, _ in reaction.ways:
                 if sign * reaction.nu_gas.get(species, 0.0) < 0.0:
-                    made |= dict.fromkeys(name for name, nu in reaction.nu_site.items() if sign * nu > 0.0)
-                    used |= {name for name, nu in reaction.nu_site.items() if sign * nu < 0.0}
-        first = tuple(name for name in made if name not in used) or tuple(made)
+                    consumed, products = _sides(reaction, sign)
+                    made |= products
+                    there |= consumed.keys()
+                    gone |= set() if reaction.backward else consumed.keys()
+        first = tuple(name for name in made if name not in gone) or tuple(made)
         while True:
-            later, gone = self._changed_alone(species, made, used)
-            if later.keys() <= made.keys() and gone <= used:
-                return tuple(name for name in made if name not in used) or first
-            made, used = made | later, used | gone
+            later, past = self._changed_alone(species, made, there)
+            if later.keys() <= made.keys() and past <= gone:
+                return tuple(name for name in made if name not in gone) or first
+            made, gone = made | later, gone | past
 
     def _changed_alone(
-        self, species: str, made: Mapping[str, None], used: Collection[str]
+        self, species: str, made: Mapping[str, None], there: Collection[str]
     ) -> tuple[dict[str, None], set[str]]:
-        """What becomes without a gas of sites that `made` has or that were there (`used`), and those that are gone for good.
+        """What becomes without a gas of sites that `made` has, beside those that were `there`, and which are gone for good by that.
 
         Nothing that gives `species` back: that is its desorption.
         """
@@ -99,17 +101,13 @@ class Mechanism:
         gone: set[str] = set()
         for reaction in self.surface_reactions:
             for sign, law in reaction.ways:
-                before = {name for name, nu in reaction.nu_site.items() if sign * nu < 0.0}
-                if (
-                    law.gas_orders
-                    or sign * reaction.nu_gas.get(species, 0.0) > 0.0
-                    or not before & made.keys()
-                    or not before <= made.keys() | used
-                ):
+                consumed, products = _sides(reaction, sign)
+                if law.gas_orders or sign * reaction.nu_gas.get(species, 0.0) > 0.0:
                     continue
-                later |= dict.fromkeys(name for name, nu in reaction.nu_site.items() if sign * nu > 0.0)
-                if reaction.backward is None:
-                    gone |= before
+                if consumed.keys() & made.keys() and consumed.keys() <= made.keys() | there:
+                    new = {name: None for name in products if name not in there}
+                    later |= new
+                    gone |= consumed.keys() if new and reaction.backward is None else set()
         return later, gone
 
     @property
@@ -250,6 +248,13 @@ class Mechanism:
 
     def __str__(self) -> str:
         return "\n".join(str(reaction) for reaction in (*self.surface_reactions, *self.gas_reactions))
+
+
+def _sides(reaction: SurfaceReaction, sign: float) -> tuple[dict[str, None], dict[str, None]]:
+    """The sites that one way of a reaction consumes and those that it makes; `sign` as in `Reaction.ways`."""
+    changes = {name: sign * nu for name, nu in reaction.nu_site.items()}
+    consumed = dict.fromkeys(name for name, nu in changes.items() if nu < 0.0)
+    return consumed, dict.fromkeys(name for name, nu in changes.items() if nu > 0.0)
 
 
 def mole_fractions(
