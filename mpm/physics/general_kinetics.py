@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from mpm.physics.mechanism import Mechanism
 
 TRIES = 30  # Newton iterations of a step
-SETTLED = 1e-10  # of a coverage: a change after which its square is below rounding
+SETTLED = 1e-8  # of a coverage: a change whose square is rounding
 STALLED, RESTS = (
     1e-6,
     20,
@@ -71,6 +71,9 @@ class GeneralKinetics:
         self.nu_places = np.array(nu).reshape(len(self.reactions), len(names)) * mechanism.places
         self.sums = invariants(self.nu_places)[0]
         self._table = RateTable(mechanism, self.reactions, coupled, sites)
+        self._last: tuple[Floats, float, Floats] | None = (
+            None  # coverages before, the step and what was found after it
+        )
         self.heat_to(temperature)
 
     def heat_to(self, temperature: ArrayLike) -> None:
@@ -81,22 +84,29 @@ class GeneralKinetics:
         """The same reactions in some of the cells."""
         other = object.__new__(GeneralKinetics)
         other.__dict__.update(self.__dict__)
-        other.sites, other._table = self.sites[chosen], self._table.part(chosen)
+        other.sites, other._table, other._last = self.sites[chosen], self._table.part(chosen), None
         return other
 
     def coverage(self, concentration: Floats, theta: Floats, dt: float) -> Floats:
         """theta' (sites, n) after `dt` [s] at the new concentrations (coupled, n) [mol/m3]; not numbers where none are found."""
-        return self._solve(self._table.gas_part(np.maximum(concentration, 0.0)), theta, dt)
+        gas = self._table.gas_part(np.maximum(concentration, 0.0))
+        return self._solve(gas, theta, np.broadcast_to(dt, self.sites.shape), self._guess(theta, dt))
 
     def rates(self, concentration: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
         """Rates r_r (reactions, n) [mol/m2/s] at the end of the step and their derivatives (reactions, coupled, n) [m/s].
 
         Continued along the tangents at zero where a concentration is negative, as Newton iterates are.
         """
-        step = self._step(
-            concentration, theta, np.broadcast_to(dt, self.sites.shape), self._none(concentration, 0)
-        )
+        guess, before = self._guess(theta, dt), self._none(concentration, 0)
+        step = self._step(concentration, theta, np.broadcast_to(dt, self.sites.shape), before, guess)
+        self._last = theta, dt, step.theta
         return step.rates + _beyond(step.rates_c, concentration), step.rates_c
+
+    def _guess(self, theta: Floats, dt: float) -> Floats:
+        """Where Newton's method starts: from what it last found for this very step, at other concentrations, else from its beginning."""
+        if self._last is not None and self._last[0] is theta and self._last[1] == dt:
+            return np.where(np.isfinite(self._last[2]), self._last[2], theta)
+        return theta
 
     def conveyed(self, concentration: Floats, theta: Floats, time: Floats | float) -> Exposure:
         """Solids that pass a cell in `time` [s, scalar or (n,)] at constant concentrations, coming in with `theta` (sites, n).
@@ -108,7 +118,7 @@ class GeneralKinetics:
         before = self._none(concentration, k)
         steps = []
         for _ in range(SUBSTEPS):
-            steps.append(self._step(concentration, theta, dt, before))
+            steps.append(self._step(concentration, theta, dt, before, theta))
             theta, before = steps[-1].theta, steps[-1]
         last = steps[-1]
         rates_c = np.mean([step.rates_c for step in steps], axis=0)
@@ -128,10 +138,10 @@ class GeneralKinetics:
 
     # --- one step ---
 
-    def _step(self, concentration: Floats, theta: Floats, dt: Floats, before: Step) -> Step:
+    def _step(self, concentration: Floats, theta: Floats, dt: Floats, before: Step, guess: Floats) -> Step:
         """From `theta` (sites, n), which depends on concentrations and on the coverage at the start as `before` says, by `dt` (n,) [s]."""
         gas = self._table.gas_part(np.maximum(concentration, 0.0))
-        new = self._solve(gas, theta, dt)
+        new = self._solve(gas, theta, dt, guess)
         at = self._table.rates(gas, new)
         c = len(concentration)
         equations = combined(self.nu_places, at.gross)
@@ -158,17 +168,16 @@ class GeneralKinetics:
 
     # --- Newton's method ---
 
-    def _solve(self, gas: GasPart, theta: Floats, dt: ArrayLike) -> Floats:
-        """Coverages at the end of a step of `dt` [s], scalar or (n,), from `theta`; not numbers where none are found."""
-        span = np.array(np.broadcast_to(np.asarray(dt, dtype=float), self.sites.shape))
-        new, lost = self._newton(gas, theta, span)
+    def _solve(self, gas: GasPart, theta: Floats, dt: Floats, guess: Floats) -> Floats:
+        """Coverages at the end of a step of `dt` (n,) [s] from `theta`; not numbers where none are found."""
+        new, lost = self._newton(gas, theta, dt, guess)
         if len(lost):
-            new[:, lost] = self.part(lost)._relax(gas.part(lost), theta[:, lost], span[lost])
+            new[:, lost] = self.part(lost)._relax(gas.part(lost), theta[:, lost], dt[lost])
         return np.clip(new, 0.0, 1.0)
 
-    def _newton(self, gas: GasPart, theta: Floats, dt: Floats) -> tuple[Floats, Ints]:
-        """Newton's method in all cells; coverages (sites, n) and the cells in which it did not arrive."""
-        new, active, part = theta.copy(), np.arange(theta.shape[1]), self
+    def _newton(self, gas: GasPart, theta: Floats, dt: Floats, guess: Floats) -> tuple[Floats, Ints]:
+        """Newton's method in all cells from `guess`; coverages (sites, n) and the cells in which it did not arrive."""
+        new, active, part = guess.copy(), np.arange(theta.shape[1]), self
         for tries in range(TRIES):
             now = new[:, active]
             change = part._change(gas, theta[:, active], now, dt[active], 0.0)
