@@ -14,8 +14,8 @@ from mpm.arrays import Floats
 from mpm.case.case import load_case
 from mpm.case.sources import built_in_files
 from mpm.constants import GAS_CONSTANT
-from mpm.physics.general_kinetics import GeneralKinetics
 from mpm.physics.mechanism import Mechanism
+from mpm.physics.rate_solvers import surface_kinetics
 from mpm.physics.reaction import SurfaceReaction
 
 AVOGADRO = 6.02214076e23
@@ -38,7 +38,7 @@ class Surface:
     def __init__(self, mechanism: Mechanism, temperature: ArrayLike, places: float):
         self.mechanism = mechanism
         self.T = np.atleast_1d(np.asarray(temperature, dtype=float))
-        self.kinetics = GeneralKinetics(
+        self.kinetics = surface_kinetics(
             mechanism, mechanism.species_names, np.full(self.T.shape, places), self.T
         )
         self.theta = np.zeros((len(mechanism.site_names), self.T.size))
