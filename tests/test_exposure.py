@@ -257,3 +257,22 @@ def test_sites_that_are_made_and_hold_more() -> None:
         sites=(EMPTY, HELD, Site("W2", {}, places=2.0)),
     )
     assert split.titrated_sites("A") == ("W2", "A*")
+
+
+def test_ways_that_are_fast_beyond_rounding() -> None:
+    """Fails when what a surface takes is the rounding of ways there and back of 1e10 events per place and second, added up."""
+    fast = langmuir(600.0, 4000.0)
+    one = found(fast, 0.03)
+    reached = 600.0 * 0.03 / (600.0 * 0.03 + 4000.0)
+    assert one.need == pytest.approx(reached, rel=1e-4)
+    assert one.lifetime == pytest.approx(N / (600.0 * 0.03 + 4000.0), rel=2e-2)
+    slowly = mechanism(
+        *fast.surface_reactions,
+        surface("stays", {"A*": -1.0, "B*": 1.0}, law(1e-8, {}, {"A*": 1.0})),
+        species=A,
+        sites=(EMPTY, HELD, Site("B*", {})),
+    )
+    after = expose(slowly, {"A": 0.03}, {"*": 1.0}, T, N)
+    assert after is not None
+    assert after.taken["A"] == pytest.approx(1.0, rel=1e-3)
+    assert after.time("A", 0.5) == pytest.approx(math.log(2.0) / (1e-8 / N * reached), rel=2e-2)

@@ -12,9 +12,10 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from mpm.physics.exposure import NOTHING, Exposed, SurfaceRates, expose
+from mpm.physics.exposure import NOTHING, Exposed, expose
 from mpm.physics.mechanism import Mechanism
 from mpm.physics.reaction import SurfaceReaction
+from mpm.physics.surface_rates import SurfaceRates
 
 Gas = Mapping[str, float]
 """Concentrations [mol/m3] by species."""
