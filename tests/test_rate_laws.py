@@ -13,6 +13,8 @@ from mpm.case.case import Case, load_case
 from mpm.case.sources import write_toml
 from mpm.errors import InputError
 from mpm.physics.rates import Dependence, Law
+from mpm.sweep.plan import plan
+from mpm.sweep.sweepfile import read_sweep
 
 R = 8.31446261815324
 SITES = 2e-5  # mol/m2
@@ -246,3 +248,31 @@ def test_the_example_of_the_documents_is_valid() -> None:
     water, oxygen = mechanism.surface_reactions
     assert water.backward is not None and water.backward.per_site == 1.0
     assert dict(oxygen.forward.site_orders) == {"*": 2.0} and list(mechanism.places) == [1.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("axis", "levels"),
+    [
+        ('equilibrium_constant"\nlogspace = { start = "0.1 m^3/mol", stop = "10 m^3/mol", num = 3 }', [0.1, 1.0, 10.0]),
+        ('orders.*"\nvalues = [1, 1.5, 2]', [1.0, 1.5, 2.0]),
+    ],
+)  # fmt: skip
+def test_a_sweep_over_a_rate_law(axis: str, levels: list[float], tmp_path: Path) -> None:
+    """An axis over an equilibrium constant takes the place of the file's reverse; one over an order in sites leaves A of shares as it is.
+    Fails when a point is refused, or is not the one that its level says."""
+    (tmp_path / "own.toml").write_text(
+        '[species.H2O]\nmolar_mass = "18.02 g/mol"\n[site."*"]\n[site."H2O*"]\n[reaction.on]\n'
+        'equation = "H2O + * <=> H2O*"\nA = "1 m/s"\nreverse = { A = "1e5 1/s" }\n'
+    )
+    (tmp_path / "case.toml").write_text(
+        '[geometry]\nbase = "single_zone"\n[chemistry]\nmechanism = "own.toml"\n'
+    )
+    (tmp_path / "sweep.toml").write_text(
+        f'[sweep]\ncase = "case.toml"\n[[sweep.axis]]\nkey = "chemistry.reaction.on.{axis}\n'
+    )
+    found = []
+    for point in plan(read_sweep(tmp_path / "sweep.toml")):
+        assert point.case is not None, point.error
+        (reaction,) = point.case.mechanism.surface_reactions
+        found.append(reaction.equilibrium.A if reaction.equilibrium else reaction.forward.site_orders["*"])
+    assert found == pytest.approx(levels)
