@@ -268,11 +268,11 @@ def test_ways_that_are_fast_beyond_rounding() -> None:
     assert one.lifetime == pytest.approx(N / (600.0 * 0.03 + 4000.0), rel=2e-2)
     slowly = mechanism(
         *fast.surface_reactions,
-        surface("stays", {"A*": -1.0, "B*": 1.0}, law(1e-8, {}, {"A*": 1.0})),
+        surface("stays", {"A*": -1.0, "B*": 1.0}, law(1e-6, {}, {"A*": 1.0})),
         species=A,
         sites=(EMPTY, HELD, Site("B*", {})),
     )
     after = expose(slowly, {"A": 0.03}, {"*": 1.0}, T, N)
     assert after is not None
     assert after.taken["A"] == pytest.approx(1.0, rel=1e-3)
-    assert after.time("A", 0.5) == pytest.approx(math.log(2.0) / (1e-8 / N * reached), rel=2e-2)
+    assert after.time("A", 0.5) == pytest.approx(math.log(2.0) / (1e-6 / N * reached), rel=2e-2)

@@ -42,7 +42,10 @@ _EFFORT = 5_000
 _NOISE = 1e-3
 """Share of what is taken up of a gas, or of all places, that may be rounding."""
 _FIRST, _GROWTH, _STEP = 1e-14, 4.0, 1e-3
-"""Implicit steps: the first [s], the factor between two at most, and by how much a whole one and two halves may differ."""
+"""Implicit steps: the first [s], the factor between two at most, and by how much a whole one and two halves may differ: of all places, and
+of what has been taken."""
+_LITTLE = 1e-3
+"""Molecules per place below which that is counted from here."""
 
 
 class _BeyondReach(Exception):
@@ -184,7 +187,7 @@ def _stepped(
         whole, events = step(theta, dt)
         half, first = step(theta, 0.5 * dt)
         new, second = step(half, 0.5 * dt)
-        apart = np.abs(uptake.T @ (first + second - events)) / np.maximum(1.0, np.abs(taken))
+        apart = np.abs(uptake.T @ (first + second - events)) / np.maximum(_LITTLE, np.abs(taken))
         error = max(np.abs(new - whole).max(), apart.max(initial=0.0))
         if not np.isfinite(error) or dt < _FIRST * _STEP:
             return None
