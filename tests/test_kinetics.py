@@ -141,7 +141,7 @@ def test_coverage_stays_between_zero_and_one(
     assert new.min() >= 0.0 and new.max() <= 1.0
     np.testing.assert_allclose(new.sum(axis=0), 1.0, atol=1e-12)
     values, _ = kinetics.rates(concentration, theta, dt)
-    turned = kinetics.nu_site.T @ values * dt / SITES
+    turned = kinetics.nu_places.T @ values * dt / SITES
     np.testing.assert_allclose(
         new - theta, turned, atol=1e-12 * max(1.0, np.abs(values).max() * dt / SITES[0])
     )
@@ -183,7 +183,7 @@ def test_conveyed_solids(rng: np.random.Generator, alumina: Mechanism, kind: str
     _, theta = random_state(rng, len(coupled), len(mechanism.sites))
     concentration = rng.uniform(0.2, 1.0, (len(coupled), N)) * 1e-3
     passed = kinetics.conveyed(concentration, theta, time)
-    turned = kinetics.nu_site.T @ passed.rates * time / SITES
+    turned = kinetics.nu_places.T @ passed.rates * time / SITES
     np.testing.assert_allclose(passed.out - theta, turned, atol=1e-12 * max(1.0, np.abs(turned).max()))
     assert passed.out.min() >= 0.0 and passed.out.max() <= 1.0 + 1e-14
     for values, slopes, name in (
@@ -219,7 +219,7 @@ def test_rate_constants_are_those_of_the_thesis(alumina: Mechanism) -> None:
     """Fails when A, the stoichiometry of (5-17), (5-18), (5-19) or the unit of the gas reaction is changed."""
     kinetics = surface(alumina, ("TMA", "H2O"))
     assert [float(k[0]) for k in kinetics.constant] == pytest.approx([0.9, 1.9])
-    assert kinetics.nu_site.tolist() == [[-1.0, 1.0], [2.0, -2.0]]
+    assert kinetics.nu_places.tolist() == [[-1.0, 1.0], [2.0, -2.0]]
     assert [r.nu_gas[r.gas] for r in kinetics.reactions] == [-1.0, -3.0]
     gas = GasKinetics(alumina, ("TMA", "H2O"), T)
     values, slopes = gas.rates(np.array([[2.0], [3.0]]))

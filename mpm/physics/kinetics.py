@@ -57,14 +57,14 @@ class SurfaceKinetics:
         self.gas = [coupled.index(r.gas) for r in self.reactions]
         self.site = [names.index(r.site) for r in self.reactions]
         self.heat_to(temperature)
-        self.nu_site = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
+        self.nu_places = np.array([[r.nu_site.get(k, 0.0) for k in names] for r in self.reactions]).reshape(
             len(self.reactions), len(names)
         )
 
     @property
     def sums(self) -> Floats:
         """Sums (sums, sites) of coverages that stay whatever reacts: of all sites, and of each kind that never turns into another."""
-        return invariants(self.nu_site)[0]
+        return invariants(self.nu_places)[0]
 
     def heat_to(self, temperature: ArrayLike) -> None:
         """Take the rate constants at another temperature [K], scalar or per cell."""
@@ -96,7 +96,7 @@ class SurfaceKinetics:
             inverse = self._solve_sites(site_rates, dt, identity)
             new = np.einsum("ksn,sn->kn", inverse, theta)
             # d theta'/d q_r = (I - dt Q)^-1 dt nu_r theta'_s(r)
-            response = dt * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, new[self.site])
+            response = dt * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_places, new[self.site])
         values = np.empty((len(self.reactions), concentration.shape[1]))
         slopes = np.zeros((len(self.reactions), *concentration.shape))
         for r, (g, s) in enumerate(zip(self.gas, self.site, strict=True)):
@@ -137,7 +137,7 @@ class SurfaceKinetics:
             span = np.broadcast_to(np.asarray(time, dtype=float), theta.shape[1:])
             inverse = self._solve_sites(rates, span, np.broadcast_to(unit[:, :, None], (k, *theta.shape)))
             out = mean = np.einsum("ksn,sn->kn", inverse, theta)
-            out_q = mean_q = span * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_site, out[self.site])
+            out_q = mean_q = span * np.einsum("ksn,rs,rn->rkn", inverse, self.nu_places, out[self.site])
             out_theta = mean_theta = inverse
         values = np.empty((count, concentration.shape[1]))
         for r, (g, s) in enumerate(self._pairs()):
@@ -164,7 +164,7 @@ class SurfaceKinetics:
         gain = np.zeros_like(theta)
         share = np.zeros((len(self.reactions), 2, len(span)))
         for r, s in enumerate(self.site):
-            share[r, 1 - s] = span * self.nu_site[r, 1 - s]
+            share[r, 1 - s] = span * self.nu_places[r, 1 - s]
             gain[1 - s] += share[r, 1 - s] * rates[r]
         return gain, share
 
@@ -182,7 +182,7 @@ class SurfaceKinetics:
         enter, all positive, so sites are conserved to rounding however much faster than the step the reactions are.
         """
         k = len(rhs)
-        turnover = dt * np.einsum("rk,rn,rs->ksn", self.nu_site, rates, np.eye(k)[self.site].reshape(-1, k))
+        turnover = dt * np.einsum("rk,rn,rs->ksn", self.nu_places, rates, np.eye(k)[self.site].reshape(-1, k))
         column_sum = np.ones((k, rates.shape[1]))
         pivot = np.empty_like(column_sum)
         x = rhs.copy()

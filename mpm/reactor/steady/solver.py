@@ -87,8 +87,8 @@ class SteadySolver:
         gas = parts["gas"].reshape(equations.own, equations.coupled).T
         coverage = parts["coverage"].reshape(-1, equations.free).T
         moving = equations.conveyor.moving
-        leaving = np.clip(self.state.theta[: equations.free, moving] - length * coverage, 0.0, 1.0)
-        leaving = np.vstack([leaving, np.maximum(1.0 - leaving.sum(axis=0), 0.0)])
+        change = length * equations.all_kinds @ coverage
+        leaving = np.clip(self.state.theta[:, moving] - change, 0.0, 1.0)
         theta = self.state.theta.copy()
         theta[:, moving] = leaving / leaving.sum(axis=0)
         predicted = self.state.concentration - length * gas

@@ -4,9 +4,10 @@
     n_s v_s dtheta/dx = n_s Q(C) theta     in the moving layer (`mpm.reactor.steady.conveyor`)
     0 = Q(C) theta                         in layers at rest
 
-Unknowns are the concentrations of the reacting species, the coverage with which solids leave every moving cell (but for one kind of site:
-they sum to 1) and, where outlets draw gas back in, what that gas holds: the mean of the cells next to each outlet. A storage term over a
-pseudo-time step [s] can be added; over the longest, `last_step`, it is negligible.
+Unknowns are the concentrations of the reacting species, the coverage with which solids leave every moving cell (but for as many kinds of
+site as there are sums that no reaction changes, such as that of all places) and, where outlets draw gas back in, what that gas holds: the
+mean of the cells next to each outlet. A storage term over a pseudo-time step [s] can be added; over the longest, `last_step`, it is
+negligible.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from mpm.arrays import Floats, Ints
 from mpm.numerics.block_matrix import BlockMatrix, Coupling, Unknowns
 from mpm.parallel import is_root, total
+from mpm.physics.small_systems import invariants
 from mpm.reactor.steady.conveyor import Conveyor
 from mpm.transport.cell_matrix import FacePattern
 from mpm.transport.reactions import Events
@@ -59,7 +61,8 @@ class Evaluation:
 class SteadySystem:
     """Residual and Jacobian of a reactor's `system` in its steady flow, in which gas reacts.
 
-    `scale` [mol/m/s]: the largest feed, or the sites that pass where those let gas go by themselves.
+    Of a moving cell's coverages those of `kinds`, `free` in number, are unknowns; a change of them is one of `all_kinds` (sites, free)
+    times it. `scale` [mol/m/s]: the largest feed, or the sites that pass where those let gas go by themselves.
     """
 
     def __init__(self, system: System):
@@ -68,7 +71,12 @@ class SteadySystem:
         self.ports, self.reactions = self.transport.ports, self.transport.reactions
         self.conveyor = Conveyor(system)
         self.coupled, self.own = self.transport.coupled, self.strip.owned
-        self.free = len(self.coverage.theta) - 1  # independent coverages of a moving cell
+        sums, dependent = invariants(self.reactions.surface.nu_places)
+        self.kinds = np.setdiff1d(np.arange(sums.shape[1]), dependent)
+        self.free = len(self.kinds)
+        self.all_kinds = np.zeros((sums.shape[1], self.free))
+        self.all_kinds[self.kinds, np.arange(self.free)] = 1.0
+        self.all_kinds[dependent] = -sums[:, self.kinds]
         self.all_operators = system.operators(system.velocity)
         self.operators = self.all_operators[: self.coupled]
         self.shares = self.ports.steady_shares
@@ -159,7 +167,7 @@ class SteadySystem:
         events = reactions.events(rates, gas_rates)
         gas = self.transport.flux_product(self.operators, c) - supply - reactions.made(events)[: self.coupled]
         gas += self.storage * (c - old.concentration) / step
-        coverage = (now.theta[:, moving] - conveyed.out)[: self.free]
+        coverage = (now.theta[:, moving] - conveyed.out)[self.kinds]
         return Evaluation(gas, coverage, events, slopes, gas_slopes, conveyed, self._size(gas, coverage))
 
     def _size(self, gas: Floats, coverage: Floats) -> float:
@@ -174,19 +182,19 @@ class SteadySystem:
     def fill_jacobian(self, at: Evaluation, step: float) -> None:
         """Enter the derivatives at `at` into `jacobian`; collective."""
         reactions, moving, conveyed, free = self.reactions, self.conveyor.moving, at.conveyed, self.free
+        kinds = self.kinds
+        whole_change = self.all_kinds * (self.conveyor.span(step) / self.conveyor.residence)
         blocks = -reactions.slopes(at.surface_slopes, at.gas_slopes)
         for i in range(self.coupled):
             blocks[:, i, i] += self.outflow[i] + self.storage / step
-        # of the entering solids that come from upstream
-        share = self.conveyor.span(step) / self.conveyor.residence
-        # the last kind of site is 1 less the others
-        rates_theta = (conveyed.rates_theta[:, :free] - conveyed.rates_theta[:, free:]) * share
-        out_theta = (conveyed.out_theta[:free, :free] - conveyed.out_theta[:free, free:]) * share
+        # of the share of the entering solids that comes from upstream
+        rates_theta = np.einsum("rkn,kf->rfn", conveyed.rates_theta, whole_change)
+        out_theta = np.einsum("ikn,kf->ifn", conveyed.out_theta[kinds], whole_change)
         values = {
             "neighbours": np.concatenate([self._faces.coupling(operator) for operator in self.operators]),
             "gas": blocks,
             "gas by coverage": -reactions.slopes_by_coverage(rates_theta, moving)[self._linked],
-            "coverage by gas": -np.moveaxis(conveyed.out_c[:free], -1, 0),
+            "coverage by gas": -np.moveaxis(conveyed.out_c[kinds], -1, 0),
             "coverage by coverage": -np.moveaxis(out_theta, -1, 0)[self._linked],
             "coverage": np.ones(free * len(moving)),
             "means": np.ones(self.unknowns.sizes["outlets"]),
