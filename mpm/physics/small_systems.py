@@ -58,10 +58,11 @@ def invariants(changes: Floats) -> tuple[Floats, list[int]]:
     """Sums (sums, kinds) that no row of `changes` (events, kinds) changes, and for each a kind that no other of them counts."""
     rows = np.array(changes, dtype=float)
     kinds = rows.shape[1]
+    nothing = 1e-9 * np.abs(rows).max(initial=1.0)
     pivots: list[int] = []
     for column in range(kinds):
         left = rows[len(pivots) :]
-        if not len(left) or np.abs(left[:, column]).max() < 1e-9 * max(np.abs(changes).max(), 1.0):
+        if not len(left) or np.abs(left[:, column]).max() < nothing:
             continue
         best = len(pivots) + int(np.argmax(np.abs(left[:, column])))
         rows[[len(pivots), best]] = rows[[best, len(pivots)]]
