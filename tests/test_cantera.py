@@ -309,6 +309,29 @@ def test_reactions_of_a_gas_alone_are_canteras(tmp_path: Path) -> None:
         assert progress(case, amounts, T, 1.0) == pytest.approx(theirs, rel=1e-10)
 
 
+ONE_RANGE = """
+phases:
+- {name: g, thermo: ideal-gas, species: [A, B], kinetics: gas, reactions: all}
+species:
+- {name: A, composition: {H: 2}, thermo: {model: NASA7, temperature-ranges: [300, 3000], data: [[3.5, 0.001, 0, 0, 0, -1000, 3]]}}
+- {name: B, composition: {H: 2}, thermo: {model: NASA7, temperature-ranges: [300, 3000], data: [[3.5, 0.002, 0, 0, 0, -1500, 3]]}}
+reactions:
+- {equation: A <=> B, rate-constant: {A: 10, b: 0, Ea: 0}}
+"""
+
+
+def test_a_polynomial_of_one_range_is_canteras(tmp_path: Path) -> None:
+    """Fails when its single set of numbers, which has no middle temperature, is refused or holds for a part of its range."""
+    (tmp_path / "g.yaml").write_text(ONE_RANGE)
+    gas = ct.Solution(str(tmp_path / "g.yaml"), "g")
+    (reaction,) = (mechanism := case_of(str(tmp_path / "g.yaml"), phase="g").mechanism).gas_reactions
+    for T in (400.0, 1500.0, 2500.0):
+        gas.TP = T, ct.one_atm
+        assert float(mechanism.equilibrium_constant(reaction, T)) == pytest.approx(
+            gas.equilibrium_constants[0], rel=1e-12
+        )
+
+
 def test_heats_are_canteras() -> None:
     """Enthalpies of reaction by the polynomials, J/mol. Fails when a range of temperature or a coefficient is another's."""
     surface = ct.Interface("ptcombust.yaml", "Pt_surf")

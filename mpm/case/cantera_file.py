@@ -8,6 +8,7 @@ are written per site, which is what Cantera means; they meet the site density of
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator
 from copy import deepcopy
@@ -244,13 +245,10 @@ def _thermochemistry(substance: Any, needed: bool) -> Table:
     if kind == "NasaPoly2" and len(thermo.coeffs) == 15:
         middle, *a = (float(value) for value in thermo.coeffs)
         temperatures = [float(thermo.min_temp), middle, float(thermo.max_temp)]
-        if not temperatures[0] < middle < temperatures[2]:  # one range: Cantera holds it twice
-            temperatures = [temperatures[0], 0.5 * (temperatures[0] + temperatures[2]), temperatures[2]]
-            a = [*(a[:7] if middle <= temperatures[0] else a[7:])] * 2
+        if not temperatures[0] < middle < temperatures[2]:  # one range, which Cantera holds twice
+            temperatures[1] = 0.5 * (temperatures[0] + temperatures[2])
         return {"nasa": {"temperatures": temperatures, "low": a[7:], "high": a[:7]}}
     if kind == "ConstantCp":
-        import math
-
         T, h, s, c = (float(value) for value in thermo.coeffs)
         table = {
             "enthalpy": f"{(h + c * (STANDARD_TEMPERATURE - T)) * 1e-3!r} J/mol",
