@@ -115,3 +115,28 @@ def test_powder_and_sweep_files(tmp_path: Any) -> None:
         text = f'[sweep]\ncase = "single_zone"\nmode = "{mode}"\nsamples = 4\nseed = 2\n{axis}'
         (tmp_path / "sweep.toml").write_text(text, encoding="utf-8")
         assert read_sweep(tmp_path / "sweep.toml").idle == idle
+
+
+def test_entropies_are_idle_without_an_equilibrium() -> None:
+    """Fails when an entropy or a reference pressure that nothing reads passes in silence, or one that an equilibrium reads is named."""
+    nothing = {"elements": {}, "enthalpy": "0 J/mol", "entropy": "0 J/mol/K"}
+    site = {"*": nothing, "A*": {**nothing, "enthalpy": "-90 kJ/mol"}}
+    species = {
+        "A": {"molar_mass": "20 g/mol", "elements": {}, "enthalpy": "0 J/mol", "entropy": "150 J/mol/K"}
+    }
+    reaction = {"on": {"equation": "A + * -> A*", "A": "1 m/s"}}
+    chemistry = {
+        "mechanism": "inline",
+        "species": species,
+        "site": site,
+        "reaction": reaction,
+        "reference_pressure": "1 atm",
+    }
+    tables = {"geometry": {"base": "single_zone"}, "chemistry": chemistry}
+    one_way = idle_keys(load_case(tables))
+    assert any(
+        "chemistry.species.A.enthalpy" in line and "chemistry.site.A*.entropy" in line for line in one_way
+    )
+    assert any(line.startswith("chemistry.reference_pressure: no way back") for line in one_way)
+    both_ways = idle_keys(load_case(tables, {"chemistry.reaction.on.equation": "A + * <=> A*"}))
+    assert not any("chemistry.s" in line or "reference_pressure" in line for line in both_ways)

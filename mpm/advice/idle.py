@@ -183,7 +183,7 @@ def _of_entropies(case: Case) -> Idle:
                     and name not in case.mechanism.equilibrated
                 ):
                     yield f"chemistry.{table}.{name}.entropy", why
-    if not case.mechanism.equilibrated:
+    if not case.mechanism.equilibrated and "reference_pressure" in case.typed("chemistry"):
         yield from _typed(case.chemistry, "chemistry", ["reference_pressure"], why)
 
 
