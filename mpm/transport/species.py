@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
 Operators = list[FluxOperator]  # of one velocity field, one per species
 NEWTON_LIMIT = 30
-# backward-error floor, relative to the sum of |diagonal C|: a residual below that is rounding, and accepted
+# backward-error floor, relative to the sum of |diagonal C| and of the places that a general law turns: a residual below is rounding,
+# accepted
 ROUNDING = float(np.finfo(float).eps)
 UNDERSHOOT = 1e-15  # of the largest concentration or feed: no accepted step has anything lower
 IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
@@ -245,6 +246,8 @@ class Transport:
         storage = reactions.gas_volume / dt
         diagonal = newton.set_fluxes(operators) + storage
         rhs = storage * old + supply
+        closed = isinstance(reactions.surface, SurfaceKinetics)
+        held = 0.0 if closed else self.coverage.capacity.sum() / dt  # events follow from differences of coverages
         new = possible(foreseen, old)
         new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
         for iteration in range(NEWTON_LIMIT):
@@ -253,7 +256,7 @@ class Transport:
             events = reactions.events(rates, gas_rates)
             made = reactions.made(events, slice(self.coupled))
             residual = self._products(matrices, new) - rhs - made
-            sums = [np.abs(residual).sum(), np.abs(diagonal * new).sum(), np.abs(made).sum()]
+            sums = [np.abs(residual).sum(), np.abs(diagonal * new).sum() + held, np.abs(made).sum()]
             size, carried, turned = total(self.strip.comm, sums)
             scale = max(self.ports.feed_rate, turned if reactions.start_by_themselves else 0.0, NO_FEED)
             worst = size / scale
@@ -265,11 +268,14 @@ class Transport:
                 return new, events
             if not np.isfinite(worst):
                 break
+            if worst < accepted and not closed:
+                new = np.maximum(new, 0.0)  # rounding, as the residual is
+                continue
             blocks = -reactions.slopes(slopes, gas_slopes)
             for i in range(self.coupled):
                 blocks[:, i, i] += diagonal[i]
             new = new - newton.solve(blocks, residual, forcing(worst), first=iteration == 0)
-            if worst > BALANCED and isinstance(reactions.surface, SurfaceKinetics):
+            if worst > BALANCED and closed:
                 new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
