@@ -247,7 +247,8 @@ class Transport:
         diagonal = newton.set_fluxes(operators) + storage
         rhs = storage * old + supply
         closed = isinstance(reactions.surface, SurfaceKinetics)
-        held = 0.0 if closed else self.coverage.capacity.sum() / dt  # events follow from differences of coverages
+        # events of a general law follow from differences of coverages
+        held = 0.0 if closed else self.coverage.capacity.sum() / dt
         new = possible(foreseen, old)
         new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
         for iteration in range(NEWTON_LIMIT):
