@@ -346,24 +346,24 @@ def test_gas_that_solids_let_go_and_take_up_again() -> None:
 
 
 def test_periodic_solids_keep_every_kind_of_site() -> None:
-    """Two kinds of site that never meet on solids that come back: each kind keeps its share, and the steady state is found.
+    """Sites that never meet those of the reactions, on solids that come back: each kind keeps its share, in a few steps.
 
     Fails when a share that no reaction changes is an unknown: the system is singular, and Newton's method wanders along it.
     """
     chemistry = mechanism(
-        r={"equation": "A + * <=> A*", "A": "0.5 m/s", "reverse": {"A": "20 1/s"}},
-        other={"equation": "A + B* <=> P* + P", "A": "0.2 m/s", "reverse": {"A": "0.4 m/s"}},
+        up={"equation": "A + * -> A*", "A": "1 m/s"},
+        down={"equation": "A* -> A + *", "A": "0.01 1/s"},
+        lost={"equation": "A + A* -> P + A*", "A": "4e-4 m/s"},
     )
     case = bed(chemistry, fidelity="steady").with_(
         {
             "geometry.bed_inflow": "periodic",
-            "geometry.inlet.in.mass_fractions": {"A": 1e-3},
-            "material.packing.initial_coverage": {"*": 0.6, "A*": 0.1, "B*": 0.3},
+            "geometry.inlet.in.mass_fractions": {"A": 3e-4},
+            "material.packing.initial_coverage": {"*": 0.7, "A*": 0.0, "B*": 0.3},
         }
     )
     reactor, result = run(case)
     assert_laws(reactor)
-    theta = {name: result.field(f"theta_{name}") for name in SITE}
-    np.testing.assert_allclose(theta["*"] + theta["A*"], 0.7, rtol=1e-10)
-    np.testing.assert_allclose(theta["B*"] + theta["P*"], 0.3, rtol=1e-10)
-    assert 0.01 < theta["A*"].mean() < 0.69
+    assert result.summary["steps"] <= 8
+    np.testing.assert_allclose(result.field("theta_*") + result.field("theta_A*"), 0.7, rtol=1e-10)
+    np.testing.assert_allclose(result.field("theta_B*"), 0.3, rtol=1e-10)

@@ -85,8 +85,8 @@ class SteadySolver:
         equations = self.equations
         parts = self._linear(at, step)
         gas = parts["gas"].reshape(equations.own, equations.coupled).T
-        coverage = parts["coverage"].reshape(-1, equations.free).T
         moving = equations.conveyor.moving
+        coverage = parts["coverage"].reshape(len(moving), equations.free).T
         change = length * equations.all_kinds @ coverage
         leaving = np.clip(self.state.theta[:, moving] - change, 0.0, 1.0)
         theta = self.state.theta.copy()
