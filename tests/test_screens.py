@@ -103,6 +103,8 @@ SCREENS: dict[str, list[str]] = {
     "check, many ports": ["check", str(ROOT / "meshes" / "four_cycles.toml")],
     "check --full": ["check", "single_zone", "--full"],
     "mechanism": ["mechanism", "single_cycle"],
+    "mechanism, any law": ["mechanism", "zirconia", "--temperature", "180 degC"],
+    "check, any law": ["check", "single_zone", "--set", "chemistry.mechanism=silicon", "--set", "geometry.inlet.tma.mass_fractions={ SiH4 = 2e-4 }"],
     "mesh": ["mesh", "single_zone", "--set", "geometry.cell_width=5 mm"],
     "run": ["run", "single_cycle", "-o", "again", "--overwrite", "--set", "geometry.cell_width=9 mm"],
     "run, steady": ["run", "single_zone", "-o", "still", "--no-report", "--overwrite", "--set", "fidelity=steady"],

@@ -106,7 +106,8 @@ def _of_inlets(
 def _made(case: Case, species: str | None) -> str:
     """What the half-reaction of a precursor makes of the sites."""
     sites = () if species is None else case.mechanism.titrated_sites(species)
-    return f"turned into {' or '.join(sites)}" if sites else "coated"
+    *first, last = sites or ("",)
+    return f"turned into {', '.join(first)}{' or ' if first else ''}{last}" if sites else "coated"
 
 
 def growth_share(case: Case, summary: Mapping[str, Any]) -> float | None:
