@@ -104,7 +104,8 @@ SCREENS: dict[str, list[str]] = {
     "check --full": ["check", "single_zone", "--full"],
     "mechanism": ["mechanism", "single_cycle"],
     "mechanism, any law": ["mechanism", "zirconia", "--temperature", "180 degC"],
-    "check, any law": ["check", "single_zone", "--set", "chemistry.mechanism=silicon", "--set", "geometry.inlet.tma.mass_fractions={ SiH4 = 2e-4 }"],
+    "check, any law": ["check", "single_zone", "--set", "chemistry.mechanism=silicon", "--set",
+        "geometry.inlet.tma.mass_fractions={ SiH4 = 2e-4 }"],
     "mesh": ["mesh", "single_zone", "--set", "geometry.cell_width=5 mm"],
     "run": ["run", "single_cycle", "-o", "again", "--overwrite", "--set", "geometry.cell_width=9 mm"],
     "run, steady": ["run", "single_zone", "-o", "still", "--no-report", "--overwrite", "--set", "fidelity=steady"],
@@ -155,7 +156,7 @@ CUT = re.compile("\u2026|[^\\].A-Z ]\\.\\.\\.$", re.MULTILINE)
 BOXES = str.maketrans(dict.fromkeys("│┃┆|┏┓┗┛┡┩┳╇┴└┘┌┐├┤─━┬┼:,;()[]'\"#", " "))
 NUMBER = r"(?<![\w.^/)-])-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.^/(]|\+\d)"
 UNIT = (
-    r"(?:(?:Pa s|mol|[mcunk]?m|[mu]?s|min|h|%|K|Pa|Hz|deg|degC|GB|kJ/mol|g/mol|1/m|sccm/m|mol/m|umol/m|steps/s|square angstrom)(?![\w])"
+    r"(?:(?:Pa s|mol|[mcunk]?m|[mu]?s|min|h|%|K|Pa|Hz|deg|degC|GB|kJ/mol|g/mol|1/m|1/s|sccm/m|mol/m|umol/m|steps/s|square angstrom)(?![\w])"
     r"|(?:cm|mm|um|nm|m|kg|Pa|[mu]?mol|J|W|sites per|per)[ /^][\w/^ ]*)"
 )
 NO_NUMBERS = re.compile(r"^\d+: |(?<![\w.])[0-9a-f]{8,}(?!\w)|\b\d+:\d\d:\d\d\b")
