@@ -121,6 +121,13 @@ def test_water_reacts_as_fast_as_measured() -> None:
     assert energy == pytest.approx(0.178, abs=0.015)  # their fit of the three
 
 
+def test_water_beside_cross_sections() -> None:
+    """Fails when what the file says of its limits is not so: beside cross sections of Vandalon and Kessels (2017) water is twice as fast at
+    300 degC (3e-19 cm2) and ten times at 100 degC (1e-20 cm2)."""
+    cross_sections = initial_sticking(np.array([300.0, 100.0]) + CELSIUS) * SITE_AREA * 1e4  # cm2
+    np.testing.assert_allclose(cross_sections / [3e-19, 1e-20], [2.0, 10.0], rtol=0.1)
+
+
 def test_adsorbed_water_leaves_again() -> None:
     """Fails when the complex does not choose between water and methane as barriers of 0.74 and 0.91 eV with one prefactor say."""
     surface = Surface(shipped("alumina_thermal"), AGUINSKY, 5e-6)
