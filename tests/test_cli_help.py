@@ -129,6 +129,8 @@ try mpm run --overw
 try mpm run sing
 try mpm resume res
 try mpm run single_zone --set geometry.inlet.tma.v
+try mpm mechanism alumina_s
+try mpm mechanism single_zone --set chemistry.reaction.tma.A
 """
     path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
     done = subprocess.run(
@@ -140,4 +142,6 @@ try mpm run single_zone --set geometry.inlet.tma.v
         "single_cycle single_zone singular.toml",
         "results/first",
         "geometry.inlet.tma.velocity",
+        "alumina_soft",
+        "chemistry.reaction.tma.A",
     ], done.stderr

@@ -45,7 +45,7 @@ def complete_setting(context: typer.Context, incomplete: str) -> list[str]:
     from mpm.case.keys import values
 
     for case in filter(
-        None, (context.params.get("case"), *context.args)
+        None, (context.params.get("case"), context.params.get("source"), *context.args)
     ):  # the latter while the line is unfinished
         try:
             return [value.name for value in values(load_case(case)) if value.name.startswith(incomplete)]
