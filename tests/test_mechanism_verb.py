@@ -138,7 +138,8 @@ def test_the_file_that_is_written_is_the_same_mechanism(
     ("arguments", "said"),
     [
         (["alumine"], "did you mean alumina"),
-        (["alumina", "--temperature", "473"], "with its unit"),
+        (["alumina", "--temperature", "473"], "--temperature: found '473' (no unit)"),
+        (["alumina", "--temperature", "0 K"], "not above 0 K"),
         (["alumina", "--set", "chemistry.reaction.tma.A=3 kg"], "chemistry.reaction.tma.A"),
         (["alumina", "--phase", "none"], "chemistry.phase"),
         (["."], "a directory"),

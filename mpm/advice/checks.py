@@ -167,6 +167,9 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     mechanism, material, k = case.mechanism, layer.material, saturated.speed
     if saturated.endless:
         numbers["endless"] = True
+    elif not mechanism.is_first_order:  # which leaves no site as it was
+        covered = (saturated.left.get(site, 0.0) for site in mechanism.titrated_sites(species))
+        numbers["saturated_coverage"] = sum(covered)
     molecular = material.pore_diffusivity(
         gas.diffusivity[species], mechanism.get(species).molar_mass, gas.temperature
     )

@@ -12,6 +12,7 @@ from mpm.case.case import Case
 from mpm.case.marks import Marked, value_text
 from mpm.case.ports import Inlet
 from mpm.report.rateunits import peculiar_orders
+from mpm.report.verdict import percent
 from mpm.screen import Listing, Sheet, number, together
 
 
@@ -163,18 +164,22 @@ def _feed(sheet: Sheet, case: Case, inlet: Inlet, numbers: dict[str, Any], marke
             part=True,
         )
     if "excess_number" in numbers:
-        ratio = (
-            f", {number(numbers['dose_ratio'], digits=3)} times what saturates"
-            if "dose_ratio" in numbers
-            else ", taken up without end"
-            if "endless" in numbers
-            else ""
-        )
         sheet.add(
             "dose",
-            f"{number(numbers['excess_number'], digits=3)} molecules per passing site{ratio}",
+            f"{number(numbers['excess_number'], digits=3)} molecules per passing site{_saturation(numbers)}",
             part=True,
         )
+
+
+def _saturation(numbers: dict[str, Any]) -> str:
+    """How a dose compares with what saturation takes; where reactions go back, that leaves some of the sites as they were."""
+    if "endless" in numbers:
+        return ", taken up without end"
+    if "dose_ratio" not in numbers:
+        return ""
+    text = f", {number(numbers['dose_ratio'], digits=3)} times what saturates"
+    covered = numbers.get("saturated_coverage", 1.0)
+    return text if covered > 0.99 else f"{text}: {percent(covered)} of the sites, where reactions go back"
 
 
 def _windows(inlet: Inlet, marked: Marked) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from mpm.case.sources import built_in_files, read_toml, write_toml
 from mpm.errors import InputError
 from mpm.files import is_file, write_atomically
 from mpm.screen import Listing, Sheet, figure, number, together
+from mpm.units import parse
 
 BARE = {
     "length": "10 mm",
@@ -34,7 +36,7 @@ def case_with(source: str, settings: Mapping[str, Any], phase: str | None, tempe
     if phase is not None:
         overrides["chemistry.phase"] = phase
     if temperature is not None:
-        overrides["gas.temperature"] = temperature
+        overrides["gas.temperature"] = _checked_temperature(temperature)
     if not _is_mechanism(source):
         if source not in built_in_files("cases") and not Path(source).exists():
             known = [*built_in_files("mechanisms"), *built_in_files("cases")]
@@ -54,6 +56,19 @@ def case_with(source: str, settings: Mapping[str, Any], phase: str | None, tempe
     if density is None or "site_density" in case.typed("material.glass_beads"):
         return case
     return case.with_({"material.glass_beads.site_density": f"{density!r} mol/m^2"})
+
+
+def _checked_temperature(text: str) -> str:
+    """The option --temperature, if it is one."""
+    try:
+        if not 0.0 < parse(text, "K") < math.inf:
+            raise ValueError("not above 0 K")
+    except ValueError as error:
+        found = f"{text!r} ({error})"
+        raise InputError.at(
+            "mpm mechanism", "--temperature", found, 'a temperature above 0 K with its unit, e.g. "473 K"'
+        ) from None
+    return text
 
 
 def _is_mechanism(source: str) -> bool:
