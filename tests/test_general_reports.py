@@ -22,7 +22,7 @@ from mpm.report.gas import cvd_totals
 from mpm.report.records import State, Totals
 from mpm.report.verdict import growth_share, percent, verdict
 
-from .cases import TINY, zone
+from .cases import TINY, cycle, zone
 from .general import SITTING, law, mechanism, surface, with_mechanism
 from .test_general_balances import book
 
@@ -206,3 +206,19 @@ def test_check_says_orders_and_endless_uptake(sitting_file: str, capsys: pytest.
     assert "OH + TMA <=> TMA* (order 2 in TMA; back: order 2 in" not in text
     assert "OH + TMA <=> TMA* (order 2 in TMA)" in text
     assert "molecules per passing site, taken up without end" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "feeds", "sites"),
+    [
+        ("titania", ("TiCl4", "H2O"), ["OTiCl3", "OH", "OH*HCl"]),
+        ("zinc_oxide", ("DEZ", "H2O"), ["OZnC2H5", "OH"]),
+        ("alumina_soft", ("TMA", "H2O"), ["OAl(CH3)2", "OAl(CH3)2_slow", "OH", "OH_slow"]),
+        ("silicon", ("SiH4", "H2"), ["SiH4*", "H2*"]),
+    ],
+)
+def test_sites_worth_a_map(name: str, feeds: tuple[str, str], sites: list[str]) -> None:
+    """Fails when the sites that a product holds down are left out of maps, or what a first-order mechanism shows has changed."""
+    inlets = zip(("tma", "water"), feeds, strict=True)
+    feed = {f"geometry.inlet.{inlet}.mass_fractions": {gas: 1e-4} for inlet, gas in inlets}
+    assert made_sites(cycle({"chemistry.mechanism": name, **feed}, TINY)) == sites

@@ -20,9 +20,16 @@ def zone_of(case: Case, inlet: Inlet) -> Zone | None:
 
 
 def made_sites(case: Case) -> list[str]:
-    """Site species worth a map: of two that add up to one, the one the first dosing inlet makes."""
-    made = list(dict.fromkeys(site for inlet in case.dosing_inlets for site in case.sites_made_by(inlet)))
-    return made[:1] if len(case.mechanism.site_names) == 2 else made
+    """Site species worth a map: of two that add up to one, the one the first dosing inlet makes.
+
+    Those that dosing inlets make, then those that a gas makes which reactions give off, as hydrogen chloride that sits down again.
+    """
+    mechanism, fed = case.mechanism, case.fed_species
+    made = dict.fromkeys(site for inlet in case.dosing_inlets for site in case.sites_made_by(inlet))
+    for species in mechanism.species_names if made and not mechanism.is_first_order else ():
+        if species not in fed:
+            made |= dict.fromkeys(mechanism.titrated_sites(species))
+    return list(made)[:1] if len(mechanism.site_names) == 2 else list(made)
 
 
 def excess_number(
