@@ -43,12 +43,20 @@ def balance_locally(
         for i in range(b):
             matrix[:, i, i] += diagonal[i, active]
         change = _solved(matrix, residual[:, loose])
+        found = np.isfinite(change).all(axis=0)
+        active, change = active[found], change[:, found]
         c[:, active] = np.maximum(np.maximum(c[:, active] - change, SHRINK * c[:, active]), LOWEST)
     return c
 
 
 def _solved(matrix: Floats, rhs: Floats) -> Floats:
-    """x (b, n) of `matrix` (n, b, b) x = `rhs` (b, n) in every cell; of one unknown it is a division."""
+    """x (b, n) of `matrix` (n, b, b) x = `rhs` (b, n) in every cell; of one unknown it is a division. No numbers where one is singular."""
     if len(rhs) == 1:
         return rhs / matrix[:, 0, 0]
-    return np.asarray(np.linalg.solve(matrix, rhs.T[:, :, None])[:, :, 0].T)
+    try:
+        return np.asarray(np.linalg.solve(matrix, rhs.T[:, :, None])[:, :, 0].T)
+    except np.linalg.LinAlgError:  # of one cell, which then stops all
+        singular = np.abs(np.linalg.slogdet(matrix)[0]) == 0.0
+        matrix[singular] = np.eye(len(rhs))
+        x = np.linalg.solve(matrix, rhs.T[:, :, None])[:, :, 0].T
+        return np.where(singular, np.nan, x)

@@ -194,7 +194,8 @@ class GeneralKinetics:
         """The same from where Newton's method gets lost, as with reactions that their own products drive: pseudo-time.
 
         d theta/ds = theta_before - theta + dt/n_s nu^T r rests at the end of the step. Linearly implicit steps in s of each cell's own
-        length: shorter after one in which a coverage would fall to less than SHRINK of what it is, longer after others.
+        length: shorter after one in which a coverage would fall to less than SHRINK of what it is, or that is too long for something that
+        grows by itself (a linearly implicit step goes the wrong way then), longer after others.
         """
         new, n = theta.copy(), theta.shape[1]
         left, part = np.arange(n), self
@@ -202,9 +203,9 @@ class GeneralKinetics:
         found = np.zeros(n, dtype=bool)
         for _ in range(RELAXATIONS):
             now = new[:, left]
-            change = part._change(gas, theta[:, left], now, dt[left], 1.0 / length[left])
+            change, onward = part._pseudo_step(gas, theta[:, left], now, dt[left], 1.0 / length[left])
             after = now - change
-            good = ((after >= SHRINK * now) | (np.abs(after) <= LEAST)).all(axis=0)
+            good = onward & ((after >= SHRINK * now) | (np.abs(after) <= LEAST)).all(axis=0)
             new[:, left[good]] = np.clip(after, 0.0, 1.0)[:, good]
             done = good & _arrived(change, now, after, length[left] >= LONGEST) & (length[left] > LONG)
             found[left[done]] = True
@@ -221,12 +222,27 @@ class GeneralKinetics:
 
     def _change(self, gas: GasPart, before: Floats, now: Floats, dt: Floats, held: Floats | float) -> Floats:
         """Newton's change (sites, n), to be taken off `now`, with a storage `held` in pseudo-time [1]."""
+        matrix, residual, _ = self._newton_system(gas, before, now, dt, held)
+        return solve_cells(matrix, residual)[:, 0]
+
+    def _pseudo_step(
+        self, gas: GasPart, before: Floats, now: Floats, dt: Floats, held: Floats
+    ) -> tuple[Floats, NDArray[np.bool_]]:
+        """The same, and whether every cell's step is short beside what grows by itself: a matrix that is singular on the way from no step
+        to this one has changed the sign of its determinant."""
+        matrix, residual, equations = self._newton_system(gas, before, now, dt, held)
+        signs = [np.linalg.slogdet(np.moveaxis(m, 2, 0))[0] for m in (matrix, equations.of_sites)]
+        return solve_cells(matrix, residual)[:, 0], signs[0] * signs[1] > 0.0
+
+    def _newton_system(
+        self, gas: GasPart, before: Floats, now: Floats, dt: Floats, held: Floats | float
+    ) -> tuple[Floats, Floats, Combined]:
+        """Matrix (equations, sites, n) and residual (equations, 1, n) of a step, and how its equations are combined."""
         at = self._table.rates(gas, now)
         equations = combined(self.nu_places, at.gross)
         residual = equations.sum_sites((now - before)[:, None])
         residual -= dt / self.sites * equations.sum_reactions(at.net[:, None])
-        matrix = self._matrix(equations, at, dt, held)
-        return solve_cells(matrix, residual)[:, 0]
+        return self._matrix(equations, at, dt, held), residual, equations
 
 
 def _arrived(change: Floats, now: Floats, after: Floats, late: ArrayLike) -> NDArray[np.bool_]:

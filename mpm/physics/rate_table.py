@@ -25,10 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Way:
-    """One way of reaction number `reaction`, which changes everything by `sign` times its stoichiometry: orders and dependences by the
-    numbers of gases and sites."""
+    """One way of reaction number `reaction`: orders and dependences by the numbers of gases and sites.
+
+    It counts as `sign` events of reaction number `counted`: that reaction itself, or the first one that it undoes.
+    """
 
     reaction: int
+    back: bool
+    counted: int
     sign: float
     gases: tuple[tuple[int, float], ...]
     sites: tuple[tuple[int, float], ...]
@@ -59,7 +63,11 @@ class Rates:
 
 
 class RateTable:
-    """The ways of `reactions` among these `gases` and the sites of a mechanism, on surfaces with `sites` n_s (n,) [mol/m2]."""
+    """The ways of `reactions` among these `gases` and the sites of a mechanism, on surfaces with `sites` n_s (n,) [mol/m2].
+
+    Reactions that undo each other, such as an adsorption and a desorption that a file lists apart, are counted as one that goes both ways,
+    the first: what is left of them is known, while the difference of two large numbers of events would not be.
+    """
 
     def __init__(
         self, mechanism: Mechanism, reactions: Sequence[Reaction], gases: Sequence[str], sites: Floats
@@ -68,8 +76,9 @@ class RateTable:
         self._gases, self._kinds = len(gases), len(mechanism.sites)
         numbers = {name: i for i, name in enumerate(gases)}
         places = {name: k for k, name in enumerate(mechanism.site_names)}
+        counted = [_counted(r, reactions) for r in range(len(reactions))]
         self.ways = [
-            _way(r, sign, reaction, law, numbers, places)
+            _way(r, sign, counted[r], reaction, law, numbers, places)
             for r, reaction in enumerate(reactions)
             for sign, law in reaction.ways
             if set(law.gas_orders) <= set(numbers)
@@ -83,7 +92,7 @@ class RateTable:
         self._thermal = GAS_CONSTANT * T
         both = [self._mechanism.rate_constants(r, T, self._sites) for r in self._reactions]
         for w, way in enumerate(self.ways):
-            self._constants[w] = both[way.reaction][0 if way.sign > 0.0 else 1]
+            self._constants[w] = both[way.reaction][int(way.back)]
 
     def part(self, chosen: NDArray[np.integer]) -> RateTable:
         """The same ways in some of the cells."""
@@ -113,12 +122,12 @@ class RateTable:
         for w, way in enumerate(self.ways):
             share, slopes = self._surface_part(way, theta)
             rate = gas.values[w] * share
-            net[way.reaction] += way.sign * rate
-            gross[way.reaction] += rate
+            net[way.counted] += way.sign * rate
+            gross[way.counted] += rate
             for g, _ in way.gases:
-                by_gas[way.reaction, g] += way.sign * share * gas.slopes[w, g]
+                by_gas[way.counted, g] += way.sign * share * gas.slopes[w, g]
             for k, slope in slopes.items():
-                by_site[way.reaction, k] += way.sign * gas.values[w] * slope
+                by_site[way.counted, k] += way.sign * gas.values[w] * slope
         return Rates(net, gross, by_gas, by_site)
 
     def _surface_part(self, way: Way, theta: Floats) -> tuple[Floats, dict[int, Floats]]:
@@ -141,8 +150,28 @@ class RateTable:
         return [*factors, power(theta, on.m)] if on.m else factors
 
 
+def _counted(number: int, reactions: Sequence[Reaction]) -> tuple[int, float]:
+    """The first of the `reactions` that changes as much as this one, or as much the other way, with the same heat; and 1 or -1."""
+    this = reactions[number]
+    for first, other in enumerate(reactions[:number]):
+        for sign in (1.0, -1.0):
+            alike = {name: sign * nu for name, nu in other.changes.items()} == dict(this.changes)
+            heats = (other.given_heat, this.given_heat)
+            if alike and (
+                heats == (None, None) or (None not in heats and sign * (heats[0] or 0.0) == heats[1])
+            ):
+                return first, sign
+    return number, 1.0
+
+
 def _way(
-    number: int, sign: float, reaction: Reaction, law: Law, gases: dict[str, int], sites: dict[str, int]
+    number: int,
+    sign: float,
+    counted: tuple[int, float],
+    reaction: Reaction,
+    law: Law,
+    gases: dict[str, int],
+    sites: dict[str, int],
 ) -> Way:
     """An order of zero counts where the way uses up what it belongs to: there the rate must end with it."""
     changes = reaction.changes
@@ -152,7 +181,9 @@ def _way(
 
     return Way(
         number,
-        sign,
+        sign < 0.0,
+        counted[0],
+        sign * counted[1],
         tuple((gases[name], order) for name, order in law.gas_orders.items() if counts(name, order)),
         tuple((sites[name], order) for name, order in law.site_orders.items() if counts(name, order)),
         tuple((sites[name], dependence) for name, dependence in law.coverage.items()),

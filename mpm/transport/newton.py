@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from mpm.arrays import Floats
 from mpm.mesh.strip import Strip
 from mpm.numerics.linear import KrylovSolver
+from mpm.parallel import largest, total
 from mpm.transport.cell_matrix import CellMatrix, interleaved
 from mpm.transport.fluxes import FluxOperator
+from mpm.transport.ports import Ports
 
 RESIDUAL = (
     1e-12  # sum of |residual| over all cells that Newton's method ends with, relative to the largest feed
@@ -25,6 +28,35 @@ PATIENCE = 5
 FILL = {"resolved": (1, 0), "averaged": (2, 2), "steady": (2, 2)}
 # reacting species up to which a second level pays: factors of blocks of six take three times as long and save one iteration in ten
 FEW = 2
+# backward-error floor, relative to the sum of |diagonal C| and what else the residual is a difference of: below is rounding, and accepted
+ROUNDING = float(np.finfo(float).eps)
+UNDERSHOOT = 1e-15  # of the largest concentration or feed: no accepted step has anything lower
+NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Of an iterate: its `worst` residual over the feed, whether that has `converged`, the `lowest` concentration [mol/m3] and whether it
+    counts as `positive`."""
+
+    worst: float
+    converged: bool
+    lowest: float
+    positive: bool
+
+
+def quality(ports: Ports, residual: Floats, carried: float, made: Floats, new: Floats) -> Quality:
+    """What to think of concentrations `new` (coupled, own) with this `residual` [mol/m/s]; collective.
+
+    Measured by the feed, or by what is `made` where solids let gas go that none is fed of. `carried` [mol/m/s]: sum of the terms.
+    """
+    comm = ports.strip.comm
+    size, carried, turned = total(comm, [np.abs(residual).sum(), carried, np.abs(made).sum()])
+    lowest, most = largest(comm, [-new.min(initial=0.0), new.max(initial=ports.largest_feed)])
+    scale = max(ports.feed_rate, float(turned), NO_FEED)
+    worst = float(size / scale)
+    converged = worst < max(RESIDUAL, ROUNDING * carried / scale)
+    return Quality(worst, bool(converged), -float(lowest), bool(lowest <= UNDERSHOOT * most))
 
 
 class NewtonSystem:

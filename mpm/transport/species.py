@@ -21,7 +21,7 @@ from mpm.flow.fields import FlowField, face_flow
 from mpm.flow.state import GasState
 from mpm.mesh.strip import Strip
 from mpm.numerics.local_newton import LOWEST, balance_locally
-from mpm.parallel import Scatter, largest, total
+from mpm.parallel import Scatter
 from mpm.physics.kinetics import SurfaceKinetics
 from mpm.physics.roles import Roles
 from mpm.transport.cell_matrix import FALL, FALL_HEATED, StepMatrix
@@ -30,7 +30,7 @@ from mpm.transport.diffusant import Diffusant
 from mpm.transport.fluxes import FluxAssembler, FluxOperator
 from mpm.transport.foresight import REMEMBERED, Past, possible
 from mpm.transport.ledger import Entries, Ledger
-from mpm.transport.newton import RESIDUAL, NewtonSystem, fill_levels, forcing
+from mpm.transport.newton import RESIDUAL, NewtonSystem, fill_levels, forcing, quality
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Events, Reactions
 
@@ -39,15 +39,11 @@ if TYPE_CHECKING:
 
 Operators = list[FluxOperator]  # of one velocity field, one per species
 NEWTON_LIMIT = 30
-# backward-error floor, relative to the sum of |diagonal C| and of the places that a general law turns: a residual below is rounding,
-# accepted
-ROUNDING = float(np.finfo(float).eps)
-UNDERSHOOT = 1e-15  # of the largest concentration or feed: no accepted step has anything lower
 IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 HALVINGS = 6
 # residual below which steps need no balanced cells; of general rate laws, which take long in a cell, the first balance has most of the gain
 BALANCED = 1e-4
-NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are divided by it
+TURNED = 16.0  # times all places per step, from whose coverages the events of general laws follow: what rounding is of
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,8 +243,7 @@ class Transport:
         diagonal = newton.set_fluxes(operators) + storage
         rhs = storage * old + supply
         closed = isinstance(reactions.surface, SurfaceKinetics)
-        # events of a general law follow from differences of coverages
-        held = 0.0 if closed else self.coverage.capacity.sum() / dt
+        held = 0.0 if closed else TURNED * self.coverage.capacity.sum() / dt
         new = possible(foreseen, old)
         new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
         for iteration in range(NEWTON_LIMIT):
@@ -257,30 +252,24 @@ class Transport:
             events = reactions.events(rates, gas_rates)
             made = reactions.made(events, slice(self.coupled))
             residual = self._products(matrices, new) - rhs - made
-            sums = [np.abs(residual).sum(), np.abs(diagonal * new).sum() + held, np.abs(made).sum()]
-            size, carried, turned = total(self.strip.comm, sums)
-            scale = max(self.ports.feed_rate, turned if reactions.start_by_themselves else 0.0, NO_FEED)
-            worst = size / scale
-            lowest, most = largest(
-                self.strip.comm, [-new.min(initial=0.0), new.max(initial=self.ports.largest_feed)]
-            )
-            accepted = max(RESIDUAL, ROUNDING * carried / scale)
-            if worst < accepted and lowest <= UNDERSHOOT * most:
+            made_by_themselves = made if reactions.start_by_themselves else 0.0 * made
+            at = quality(self.ports, residual, np.abs(diagonal * new).sum() + held, made_by_themselves, new)
+            if at.converged and at.positive:
                 return new, events
-            if not np.isfinite(worst):
+            if not np.isfinite(at.worst):
                 break
-            if worst < accepted and not closed:
+            if at.converged and not closed:
                 new = np.maximum(new, 0.0)  # rounding, as the residual is
                 continue
             blocks = -reactions.slopes(slopes, gas_slopes)
             for i in range(self.coupled):
                 blocks[:, i, i] += diagonal[i]
-            new = new - newton.solve(blocks, residual, forcing(worst), first=iteration == 0)
-            if worst > BALANCED and closed:
+            new = new - newton.solve(blocks, residual, forcing(at.worst), first=iteration == 0)
+            if at.worst > BALANCED and closed:
                 new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
-            f"{worst:.3g} of the feed, lowest concentration {-lowest:.3g} mol/m3"
+            f"{at.worst:.3g} of the feed, lowest concentration {at.lowest:.3g} mol/m3"
         )
 
     def _balance(

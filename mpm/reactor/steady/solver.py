@@ -35,6 +35,7 @@ TRIES = 50  # Newton steps from the first guess
 STEP_TRIES = 15  # and per step of pseudo-time
 LIMIT = 400  # Newton steps on one mesh
 DAMPED = 0.5  # length of a damped Newton step, after one that made things worse: two iterates may follow each other for ever
+HOPELESS = 1e9  # residual that no step has come back from
 LOOSE = 0.01  # residual at which pseudo-time goes on
 FIRST_STEP, SHORTEST_STEP = 1.0, 1e-6  # s, pseudo-time
 GROWTH, SHRINKAGE = 10.0, 20.0  # of its steps, after one that converged and one that did not
@@ -125,6 +126,8 @@ class SteadySolver:
         """Newton steps until the residual is below `target`; False when `tries` are not enough."""
         start, length, worst = self.state, 1.0, np.inf
         at = self.equations.evaluate(self.state, self.old, step)
+        if not np.isfinite(at.size):  # no coverage was found in some cell
+            return False
         for _ in range(tries):
             last = worst
             try:
@@ -133,7 +136,7 @@ class SteadySolver:
                 self._trouble = error
                 return False
             worst = at.size
-            if not np.isfinite(worst):
+            if not worst < HOPELESS:
                 self.state = start
                 return False
             self.watch(self.iterations, worst)
