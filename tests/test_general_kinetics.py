@@ -260,3 +260,30 @@ def test_sums_that_stay() -> None:
     np.testing.assert_allclose(
         np.linalg.svd(np.vstack([sums, [[1, 1, 0, 0], [0, 0, 1, 1]]]))[1][2:], 0.0, atol=1e-12
     )
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1.0])
+def test_reactions_that_undo_each_other_count_as_one(dt: float) -> None:
+    """Adsorption and desorption at 1e12 per second, listed apart: events are net and known to the rounding of the coverages, so that gas
+    does not see that of 1e9 turnovers. Fails when both are counted, or a pair of other heats or amounts is taken for one."""
+    up = reaction(
+        "up", law(1e15 * SITES[0], {"A": 1.0}, {"free": 1.0}), None, {"A": -1.0}, {"free": -1.0, "a": 1.0}
+    )
+    down = reaction("down", law(1e12 * SITES[0], {}, {"a": 1.0}), None, {"A": 1.0}, {"free": 1.0, "a": -1.0})
+    twice = reaction(
+        "twice", law(1e-3, {"A": 1.0}, {"free": 2.0}), None, {"A": -2.0}, {"free": -2.0, "a": 2.0}
+    )
+    mechanism = Mechanism(
+        name="x", species=(Species("A", 0.03, {}),), sites=(Site("free", {}), Site("a", {})), films=(),
+        surface_reactions=(up, down, twice), gas_reactions=(),
+    )  # fmt: skip
+    kinetics = GeneralKinetics(mechanism, ("A",), SITES, T)
+    concentration = np.asarray(1e-3 * (1.0 + 1e-13 * np.arange(N)))[None, :].astype(np.float64)
+    start = np.tile([[0.5], [0.5]], N)
+    values, _ = kinetics.rates(concentration, start, dt)
+    assert not values[1].any() and values[2].all()
+    np.testing.assert_allclose(values[0] * dt / SITES, values[0, 0] * dt / SITES[0], atol=2e-13)
+    theta = kinetics.coverage(concentration, start, dt)
+    np.testing.assert_allclose(theta[1] - 0.5, (values[0] + 2.0 * values[2]) * dt / SITES, atol=1e-15)
+    theta = kinetics.coverage(concentration, np.tile([[1.0], [0.0]], N), dt)
+    np.testing.assert_allclose(theta[1], 0.5, atol=1e-6)
