@@ -3,7 +3,7 @@
 Newton's method with a sparse LU factor on `mpm.reactor.steady.system`. Each of its steps ends with a balance of every cell by itself
 (`mpm.reactor.steady.cellwise`), without which a front thinner than a cell hardly moves. Large meshes start from the steady state of a
 coarser one (`mpm.reactor.steady.coarsening`), others from the gas and the solids of the case. Where Newton's method does not find the
-state from there, pseudo-time of growing steps does.
+state from there, pseudo-time of growing steps does, or a march in time (`mpm.reactor.steady.marching`) leads near it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from mpm.parallel import any_rank, largest
 from mpm.reactor.steady.cellwise import balanced
 from mpm.reactor.steady.coarsening import coarser, prolonged
 from mpm.reactor.steady.conveyor import Conveyor
+from mpm.reactor.steady.marching import guesses
 from mpm.reactor.steady.system import LAST_STEP, Evaluation, Iterate, SteadySystem
 from mpm.reactor.system import System
 from mpm.transport.fluxes import FluxOperator
@@ -71,11 +72,26 @@ class SteadySolver:
         try:
             if not self._relax(self.equations.last_step, TRIES):
                 self.state = start
-                self._pseudo_time()
+                self._pseudo_time_or_march(start)
         finally:
             if self._solver is not None:
                 self._solver.destroy()
                 self._solver = None
+
+    def _pseudo_time_or_march(self, start: Iterate) -> None:
+        """Pseudo-time, and where that fails Newton's method from where marches in time lead. Raises the ConvergenceError of pseudo-time."""
+        try:
+            self._pseudo_time()
+        except ConvergenceError:
+            last, equations = (self.state, self.old), self.equations
+            products = equations.transport.concentration[equations.coupled :]
+            cold = np.vstack([start.concentration, products])
+            for gas, theta in guesses(equations.system, equations.conveyor, cold, start.theta):
+                self.state = self.old = Iterate(gas[: equations.coupled], theta)
+                if self._relax(equations.last_step, STEP_TRIES):
+                    return
+            self.state, self.old = last
+            raise
 
     def newton(self, at: Evaluation, step: float, length: float = 1.0) -> Evaluation:
         """One Newton step, or a damped one of this `length`, at pseudo-time step `step` [s]; returns the evaluation after it.
