@@ -548,7 +548,7 @@ def compare(case: Tables, steady: Reactor, flow: Flow | None, found: Found) -> N
     found.state, found.gap = "agrees", max(stays, cold)
     if found.gap < CLOSE:
         return
-    if max(drift, change) < RESTS:
+    if max(drift, change) < RESTS and abs(cold - stays) < CLOSE:
         narrow = {**case, "geometry": {**case["geometry"], "cell_width": f"{0.5 * WIDTH} m"}}
         reactor = Reactor(load_case(narrow, {"fidelity": "steady"}), MPI.COMM_SELF)
         reactor.run()
@@ -557,7 +557,10 @@ def compare(case: Tables, steady: Reactor, flow: Flow | None, found: Found) -> N
         if max(stays, cold) < 0.7 * found.gap:
             found.state = f"agrees, {first}"
             return
-    found.state = first
+    if stays < CLOSE:
+        found.state = f"stays there, comes from the start too slowly or not: {first}"
+    else:
+        found.state = f"leaves it: {first}"
 
 
 def one(seed: int, long: bool = True) -> Found:

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import mechanisms
 
 COMM = MPI.COMM_WORLD
-QUICK = (3, 4, 6, 10, 16, 18, 20, 22, 30, 39, 41)
+QUICK = (4, 6, 10, 16, 18, 20, 22, 30, 39, 41)
 """Seeds of every layout but the slow ones: some whose steps are halved, on periodic solids, between walls, with heat, without ports."""
 COMPARED = (6, 16)
 """Seeds whose bed rests, so that averaged steps may become as long as they like and nothing but rounding is between their end and the
