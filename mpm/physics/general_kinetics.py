@@ -30,14 +30,10 @@ if TYPE_CHECKING:
 
 TRIES = 30  # Newton iterations of a step
 SETTLED = 1e-8  # of a coverage: a change whose square is rounding
-STALLED, RESTS = (
-    1e-6,
-    20,
-)  # of a coverage: a change that rounding alone keeps alive, after this many iterations
-LEAST, ROUNDING = (
-    1e-22,
-    1e-17,
-)  # of all places: so few are none, and what those differences that are left of all of them are known to
+RESTS = 20  # of them, after which rounding may be what keeps a change alive
+STALLED = 1e-6  # of a coverage: the change that then counts as none
+LEAST = 1e-22  # of all places: so few are none
+ROUNDING = 1e-17  # of all places: what differences between nearly all of them are known to
 SHRINK = 0.01  # factor on a coverage that an iteration would make negative
 FIRST, LONGER, SHORTER = 1e-6, 4.0, 0.1  # steps of pseudo-time, in units of the step
 LONG, LONGEST, SHORTEST, RELAXATIONS = 1e3, 1e12, 1e-30, 300
@@ -71,9 +67,8 @@ class GeneralKinetics:
         self.nu_places = np.array(nu).reshape(len(self.reactions), len(names)) * mechanism.places
         self.sums = invariants(self.nu_places)[0]
         self._table = RateTable(mechanism, self.reactions, coupled, sites)
-        self._last: tuple[Floats, float, Floats] | None = (
-            None  # coverages before, the step and what was found after it
-        )
+        # coverages before the last step, its length, and those after it
+        self._last: tuple[Floats, float, Floats] | None = None
         self.heat_to(temperature)
 
     def heat_to(self, temperature: ArrayLike) -> None:
@@ -146,9 +141,8 @@ class GeneralKinetics:
         c = len(concentration)
         equations = combined(self.nu_places, at.gross)
         start = np.concatenate([theta[:, None], before.theta_c, before.theta_theta], axis=1)
-        nothing = np.zeros(
-            (len(at.net), before.theta_theta.shape[1], theta.shape[1])
-        )  # solids act through theta alone
+        # solids act through theta alone
+        nothing = np.zeros((len(at.net), before.theta_theta.shape[1], theta.shape[1]))
         slopes = np.concatenate([at.by_gas, nothing], axis=1)
         rhs = equations.sum_sites(start[:, 1:]) + dt / self.sites * equations.sum_reactions(slopes)
         response = solve_cells(self._matrix(equations, at, dt), rhs)
