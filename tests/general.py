@@ -99,3 +99,44 @@ A = "0.9 m/s"
 reverse = { A = "1e-4 mol/m^2/s" }
 """
 """TMA sits down on OH and comes off again, K = 9000 m3/mol."""
+
+
+def _amounts(*elements: str) -> dict[str, dict[str, float]]:
+    return {"elements": {e: float(elements.count(e)) for e in set(elements)}}
+
+
+SIX_GASES = {
+    "chemistry": {
+        "mechanism": "inline",
+        "name": "six gases",
+        "species": {
+            name: {"molar_mass": f"{20.0 * len(atoms)!r} g/mol", **_amounts(*atoms)}
+            for name, atoms in {"A": "Q", "B": "Z", "C": "QZ", "D": "QQ", "E": "ZZ", "F": "QQZ"}.items()
+        },
+        "site": {"free": _amounts(), "sA": _amounts("Q"), "sB": _amounts("Z"), "sAB": _amounts("Q", "Z")},
+        "reaction": {
+            "r1": {"equation": "A + free <=> sA", "A": "2 m/s", "reverse": {"A": "500 1/s"}},
+            "r2": {"equation": "B + free <=> sB", "A": "1 m/s", "reverse": {"A": "50 1/s"}},
+            "r3": {
+                "equation": "sA + sB <=> sAB + free",
+                "A": "1e11 m^2/mol/s",
+                "reverse": {"A": "1e9 m^2/mol/s"},
+            },
+            "r4": {"equation": "sAB <=> C + free", "A": "300 1/s", "reverse": {"A": "0.5 m/s"}},
+            "r5": {
+                "equation": "2 sA <=> D + 2 free",
+                "A": "1e9 m^2/mol/s",
+                "reverse": {"A": "1e5 m^5/mol^2/s"},
+            },
+            "r6": {
+                "equation": "2 sB <=> E + 2 free",
+                "A": "1e9 m^2/mol/s",
+                "reverse": {"A": "1e6 m^5/mol^2/s"},
+            },
+            "r7": {"equation": "A + C <=> F", "A": "1 m^3/mol/s", "reverse": {"A": "0.1 1/s"}},
+            "r8": {"equation": "A + sB <=> sAB", "A": "0.1 m/s", "reverse": {"A": "10 1/s"}},
+        },
+    },
+    "geometry.inlet.tma.mass_fractions": {"A": 3e-4, "B": 2e-4},
+}
+"""Six gases, four kinds of site, eight reactions that all go both ways, in the single zone: changes of its case."""
