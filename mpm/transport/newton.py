@@ -48,7 +48,7 @@ class Quality:
 def quality(ports: Ports, residual: Floats, carried: float, made: Floats, new: Floats) -> Quality:
     """What to think of concentrations `new` (coupled, own) with this `residual` [mol/m/s]; collective.
 
-    Measured by the feed, or by what is `made` where solids let gas go that none is fed of. `carried` [mol/m/s]: sum of the terms.
+    Measured by the feed, or by what is `made` [mol/m/s] where solids let gas go by themselves. `carried` [mol/m/s]: sum of the terms.
     """
     comm = ports.strip.comm
     size, carried, turned = total(comm, [np.abs(residual).sum(), carried, np.abs(made).sum()])

@@ -252,8 +252,8 @@ class Transport:
             events = reactions.events(rates, gas_rates)
             made = reactions.made(events, slice(self.coupled))
             residual = self._products(matrices, new) - rhs - made
-            made_by_themselves = made if reactions.start_by_themselves else 0.0 * made
-            at = quality(self.ports, residual, np.abs(diagonal * new).sum() + held, made_by_themselves, new)
+            let_go = made if reactions.start_by_themselves else made[:0]
+            at = quality(self.ports, residual, np.abs(diagonal * new).sum() + held, let_go, new)
             if at.converged and at.positive:
                 return new, events
             if not np.isfinite(at.worst):
@@ -286,8 +286,10 @@ class Transport:
         def sources(c: Floats, active: NDArray[np.intp]) -> tuple[Floats, Floats]:
             rates = reactions.surface.part(active).rates(c, theta[:, active], dt)
             made, slopes = reactions.on_surfaces(active, *rates)
-            in_gas = reactions.in_gas(cells[active], c)
-            return made + in_gas[0], slopes + in_gas[1]
+            if reactions.gas.reactions:
+                in_gas = reactions.in_gas(cells[active], c)
+                made, slopes = made + in_gas[0], slopes + in_gas[1]
+            return made, slopes
 
         idle = IDLE * self.ports.feed_rate
         start = np.maximum(new[:, cells], LOWEST)
