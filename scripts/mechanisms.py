@@ -42,7 +42,7 @@ from mpi4py import MPI  # isort: skip  (after mpm.numerics.fem)
 Tables = dict[str, Any]
 Amounts = dict[str, int]
 
-BALANCE, TRACE = 1e-10, 1e-7
+BALANCE, TRACE = 1e-9, 1e-7
 """Largest error of a balance, as it is reported: in time, and of a steady state, whose solver leaves 1e-12 of the feed; balances of traces
 are measured against 1e-6 of it."""
 SUM = 1e-11
