@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 PASSAGES = (2, 4, 8, 16)  # of the bed through the strip, one march after the other
 RESTING_STEP = 0.1  # s, of a bed that does not move
+SHARES = 8  # steps while solids are in a cell: ignition is quicker than their passage
 LATE = 1e6  # s: when inlets that begin later blow
 
 
@@ -38,17 +39,18 @@ def guesses(
 def _marched(
     system: System, conveyor: Conveyor, concentration: Floats, theta: Floats, steps: int
 ) -> tuple[Floats, Floats]:
-    """The state after so many steps of one column each; gas, solids and accounts of the `system` stay as they are."""
+    """The state after the bed has moved on by so many columns; gas, solids and accounts of the `system` stay as they are."""
     transport, coverage = system.transport, system.coverage
     solids, gas = coverage.memento(), transport.memento()
     operators = system.operators(system.velocity)
-    dt = conveyor.residence if conveyor.runs else RESTING_STEP
+    dt = (conveyor.residence if conveyor.runs else RESTING_STEP) / SHARES
     column = conveyor.direction * system.strip.grid.dx if conveyor.runs else 0.0
     try:
         transport.concentration = concentration
         coverage.become(theta)
-        for number in range(steps):
-            coverage.slide(column)
+        for number in range(SHARES * steps):
+            if number % SHARES == 0:
+                coverage.slide(column)
             transport.advance(operators, LATE + number * dt, dt, recurs=True)
         return transport.concentration, coverage.theta
     finally:
