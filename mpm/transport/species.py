@@ -43,7 +43,6 @@ IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 HALVINGS = 6
 # residual below which steps need no balanced cells; of general rate laws, which take long in a cell, the first balance has most of the gain
 BALANCED = 1e-4
-MANY = 4  # general species for which a balance costs more than it spares: six of them take an eighth longer with it, two a tenth less
 TURNED = 16.0  # times all places per step, from whose coverages the events of general laws follow: what rounding is of
 
 
@@ -246,8 +245,7 @@ class Transport:
         closed = isinstance(reactions.surface, SurfaceKinetics)
         held = 0.0 if closed else TURNED * self.coverage.capacity.sum() / dt
         new = possible(foreseen, old)
-        if closed or self.coupled <= MANY:
-            new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
+        new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
         for iteration in range(NEWTON_LIMIT):
             rates, slopes = reactions.surface.rates(new[:, cells], theta, dt)
             gas_rates, gas_slopes = reactions.gas.rates(new)
