@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parents[1] / "mpm"
 DOOR = {"__init__", "__main__", "session", "drawing", "optimise"}
 """Modules at the top that may see everything: what `import mpm` offers, `mpm plot` and `mpm optimise`."""
 GROUND = {
-    *("arrays", "constants", "errors", "files", "help", "labels", "launcher", "markup", "metric", "parallel", "plain"),
+    *("arrays", "constants", "conversion", "errors", "files", "help", "labels", "launcher", "markup", "metric", "parallel", "plain"),
     *("revision", "screen", "signals", "spelling", "units"),
 }  # fmt: skip
 """Modules at the top that see nothing but each other."""
