@@ -189,6 +189,7 @@ BOOKKEEPING = {
     "ranks",
     "wall_seconds",
     "versions",
+    "conventions",
     "revision",
     "status",
     "title",

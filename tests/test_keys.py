@@ -56,7 +56,11 @@ def test_a_key_is_found_by_its_name_its_last_part_or_the_name_of_an_entry() -> N
     assert {key.name for key in find_keys("density")} == {
         "gas.density", "material.<name>.density", "chemistry.film.<name>.density",
     }  # fmt: skip
-    assert [key.last for key in keys_of("transport")] == ["vibrational_dispersion"]
+    assert [key.last for key in keys_of("transport")] == [
+        "scheme",
+        "backflow_rows",
+        "vibrational_dispersion",
+    ]
     assert "velocity" in [key.last for key in keys_of("geometry.inlet")]
 
 

@@ -173,7 +173,9 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     molecular = material.pore_diffusivity(
         gas.diffusivity[species], mechanism.get(species).molar_mass, gas.temperature
     )
-    diffusivity = effective_diffusivity(molecular, material.porosity, material.tortuosity_factor[1])
+    diffusivity = effective_diffusivity(
+        molecular, material.porosity, material.tortuosity_factor[1], case.porous.diffusion
+    )
     velocity = eng.rising_velocity(case, inlet.center)
     surface = material.surface_to_volume
     numbers["species"] = species

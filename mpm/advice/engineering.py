@@ -14,6 +14,7 @@ from mpm.constants import AVOGADRO
 from mpm.mesh.grid import Grid
 from mpm.motion.kinematics import Vibration
 from mpm.motion.schedule import Schedule
+from mpm.physics.porous import effective_diffusivity
 
 STANDARD_TEMPERATURE, STANDARD_PRESSURE = 273.15, 101325.0
 """[K], [Pa]: what a standard cubic centimetre (sccm) of a mass flow controller refers to."""
@@ -163,10 +164,11 @@ def flow_courant(case: Case, grid: Grid) -> float:
 
 
 def numerical_diffusion(case: Case, grid: Grid) -> float:
-    """What exponential fitting adds to diffusion along x, as a share of the smallest diffusivity: (Pe/2) coth(Pe/2) - 1.
+    """What the scheme adds to diffusion along x, as a share of the smallest diffusivity: (Pe/2) coth(Pe/2) - 1 with exponential fitting,
+    Pe/2 with upwinding, nothing with central differences up to Pe = 2 and Pe/2 - 1 beyond.
 
-    Pe = v dx tau^2 / D of a column, with the speed v at which gas may pass the columns of the mesh: that of the bed, which takes its gas
-    along, and the reactor's peak velocity where every phase is resolved. About Pe^2/12 in fine meshes.
+    Pe = u dx / D_eff of a column, with the superficial velocity u at which gas may pass the columns of the mesh: with the bed, which takes
+    its gas along, and at the reactor's peak velocity where every phase is resolved. About Pe^2/12 in fine meshes.
     """
     vibration, speed = Vibration.from_motion(case.motion), abs(case.conveying_velocity)
     if case.fidelity == "resolved":
@@ -175,10 +177,15 @@ def numerical_diffusion(case: Case, grid: Grid) -> float:
     if slowest == 0.0 or speed == 0.0:
         return 0.0
     layer = case.geometry.moving_layer
-    tortuosity = (
-        layer.material.tortuosity_factor[0] if layer is not None and layer.material is not None else 1.0
-    )
-    half = 0.5 * peclet(velocity=speed * tortuosity, length=grid.dx, diffusivity=slowest)
+    if layer is not None and layer.material is not None:
+        porosity, tortuosity = layer.material.porosity, layer.material.tortuosity_factor[0]
+        slowest = effective_diffusivity(slowest, porosity, tortuosity, case.porous.diffusion)
+        speed *= porosity if case.motion.drag_reference == "pore" else 1.0
+    half = 0.5 * peclet(velocity=speed, length=grid.dx, diffusivity=slowest)
+    if case.transport.scheme == "upwind":
+        return half
+    if case.transport.scheme == "central":
+        return max(half - 1.0, 0.0)
     return half / math.tanh(half) - 1.0
 
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mpm.case.conventions import preset_tables
 from mpm.case.keytable import ENTRIES, READ_BY, Key, all_keys, keys_of, toml_name, toml_text
 from mpm.case.materials import BUILT_IN
 from mpm.case.schema import for_people
@@ -41,7 +42,8 @@ Address = tuple[str, ...]
 class Value:
     """One value of a case: `name` with the case's own names, `text` in the unit that people read, and where it comes from.
 
-    origin: typed (in the file or by --set), base (the shared geometry), built-in (material, mechanism), default, or worked out.
+    origin: typed (in the file or by --set), base (the shared geometry), built-in (material, mechanism, preset of conventions), default, or
+    worked out.
     """
 
     name: str
@@ -147,7 +149,8 @@ def _sources(case: Case) -> tuple[Any, Mapping[str, Any], Any, Any]:
     of = case.origin
     mechanism = mechanism_tables(of.data, of.overrides, of.folder, of.label)
     base = {"geometry": shared_geometry(of.data, of.overrides, of.folder, of.label)}
-    return of.data, of.overrides, base, {"material": BUILT_IN, "chemistry": mechanism}
+    built_in = {"material": BUILT_IN, "chemistry": mechanism, **preset_tables(case.conventions)}
+    return of.data, of.overrides, base, built_in
 
 
 def _set_by(dotted: str, value: Any, path: Address) -> bool:

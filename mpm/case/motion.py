@@ -42,6 +42,8 @@ class Motion(Frozen):
     """phase of the cycle at which the bed lifts off, 0 deg to below 360 deg (profile phases)"""
     contact_phase: Angle | None = None
     """phase of the cycle at which the bed lands again, 0 deg to below 360 deg (profile phases)"""
+    drag_reference: Literal["pore", "superficial"] = "pore"
+    """velocity of the superficial gas at which a moving bed does not drag on it. pore: eps times the bed's; superficial: the bed's"""
     inlet_frame: Literal["reactor", "lab"] = "reactor"
     """what the inlets are fixed to: they ride on the reactor, or stand still in the laboratory while it moves over them"""
     start: Instant = 0.05

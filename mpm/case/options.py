@@ -1,8 +1,8 @@
-"""The tables `[time]`, `[output]` and `[transport]` of a case: how it is run, not what it is."""
+"""The tables `[time]`, `[output]`, `[transport]` and `[porous]` of a case: how it is run and counted, not what it is."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, Strict
 
@@ -34,7 +34,24 @@ class Output(Frozen):
 
 
 class TransportOptions(Frozen):
-    """Options of the species' transport."""
+    """How species (and heat) are carried from cell to cell."""
+
+    scheme: Literal["fitted", "upwind", "central"] = "fitted"
+    """flux between two cells. fitted: exponential fitting, exact in one dimension; upwind: first order, adds |u| h/2 to diffusion; central:
+    second order, upwind where a cell's Peclet number is above 2"""
+    backflow_rows: Annotated[int, Strict(), Field(ge=1, le=2)] = 1
+    """rows of cells next to an outlet whose mean it draws back in"""
 
     vibrational_dispersion: Flag = False
     """in averaged and steady runs: add to diffusion what the swinging gas disperses, from the flow of a whole cycle"""
+
+
+class Porous(Frozen):
+    """Conventions of a porous medium that codes do not share. The first of each is that of `docs/source.md`."""
+
+    diffusion: Literal["effective", "free", "printed"] = "effective"
+    """what pores leave of the diffusivity D of free gas. effective: eps D/tau^2; free: D; printed: eps D/tau, as the thesis has it"""
+    inertia: Literal["interstitial", "superficial"] = "interstitial"
+    """inertia of the gas in pores. interstitial: (rho/eps) du/dt + (rho/eps^2) u.grad u; superficial: eps rho du/dt + rho u.grad u"""
+    reaction_volume: Literal["gas", "total"] = "gas"
+    """volume that gas reactions run in: that of the gas in the pores, or the whole"""

@@ -16,6 +16,7 @@ from typing import Any
 import tomli_w
 
 from mpm.case.cantera_file import cantera_tables, is_cantera
+from mpm.case.conventions import preset_tables
 from mpm.case.materials import BUILT_IN
 from mpm.case.merging import Table, replaced
 from mpm.case.merging import merge as merge  # offered here too
@@ -28,7 +29,7 @@ from mpm.spelling import quotes_advice
 
 _OF_MECHANISM = ("chemistry.mechanism", "chemistry.phase", "chemistry.gas_reactions")
 _KEYS = ("mechanism", "phase", "gas_reactions")
-_SOURCES = ("geometry.base", *_OF_MECHANISM)
+_SOURCES = ("conventions", "geometry.base", *_OF_MECHANISM)
 """Keys that name what the other tables lie over."""
 DEEPEST = 30
 """Levels of tables and lists in a file; a case needs five."""
@@ -155,6 +156,7 @@ def assemble(data: Mapping[str, Any], overrides: Mapping[str, Any], folder: Path
             set_key(result, key, overrides[key], source)
     if "geometry" in result:
         result["geometry"] = _with_base(result["geometry"], folder, source)
+    result = merge(preset_tables(result.get("conventions")), result)
     _insert_mechanism(
         result, folder, source, "energy" in result or any(_is_below(k, "energy") for k in overrides)
     )

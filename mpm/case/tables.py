@@ -14,7 +14,7 @@ from mpm.case.geometry import Geometry
 from mpm.case.materials import Material
 from mpm.case.model import Frozen
 from mpm.case.motion import Motion
-from mpm.case.options import Output, Time, TransportOptions
+from mpm.case.options import Output, Porous, Time, TransportOptions
 from mpm.case.ports import Inlet
 from mpm.case.reactions import build_mechanism, check_rates
 from mpm.physics.mechanism import Mechanism, mole_fractions
@@ -28,6 +28,9 @@ class CaseTables(Frozen):
     """a line that names the case on screens, pictures and in results"""
     fidelity: Literal["resolved", "averaged", "steady"] = "averaged"
     """resolved: every phase of every vibration; averaged: their mean, in time; steady: the state that an averaged run ends in"""
+    conventions: Literal["mpm", "closed-code"] = "mpm"
+    """what the switches transport.scheme, transport.backflow_rows, porous.*, motion.drag_reference and geometry.inlet_diffusion are where
+    the file leaves them out: those of this model, or those of the closed code with which the thesis computed"""
     geometry: Geometry
     """the strip: its size, layers from bottom to top, ports and zones"""
     materials: dict[str, Material] = Field({}, alias="material")
@@ -43,7 +46,9 @@ class CaseTables(Frozen):
     output: Output = Output()
     """how often results and restart states are written"""
     transport: TransportOptions = TransportOptions()
-    """options of the species' transport"""
+    """how species are carried from cell to cell"""
+    porous: Porous = Porous()
+    """conventions of a porous medium that codes do not share"""
     energy: Energy | None = None
     """temperature as a field: present, it is solved for; absent, all is at gas.temperature"""
 

@@ -1,9 +1,9 @@
 """Convection of the gas, (rho/eps) u.grad w with w = u/eps the velocity of the gas between the grains, as differences on the grid.
 
-Within a layer that is (rho/eps^2) u.grad u. Central in the jumps between cells. What gas brings along when it passes the face of a layer
-is its own velocity w, which is the same on both sides of a moving bed, where u jumps from eps v_s to v_s: with jumps of u the flow would
-depend on the frame of the observer. Gas that comes in through a port or outlet carries no tangential velocity. Central differences are safe
-while u h/nu < 2, which `mpm check` reports.
+Within a layer that is (rho/eps^2) u.grad u; with `porous.inertia = "superficial"` eps is 1 in all of this, as the thesis prints it. Central
+in the jumps between cells. What gas brings along when it passes the face of a layer is its own velocity w, which is the same on both sides
+of a moving bed, where u jumps from eps v_s to v_s: with jumps of u the flow would depend on the frame of the observer. Gas that comes in
+through a port or outlet carries no tangential velocity. Central differences are safe while u h/nu < 2, which `mpm check` reports.
 
 Tested with the functions v of the Raviart-Thomas elements of lowest order, with c = rho/eps, this is the sum of products
 
@@ -127,7 +127,8 @@ class _Products:
     def __init__(self, space: FlowSpace, density: float | Floats):
         self.space, strip = space, space.strip
         grid, own = strip.grid, strip.owned
-        eps, width = strip.porosity, grid.dx
+        interstitial = space.case.porous.inertia == "interstitial"
+        eps, width = strip.porosity if interstitial else np.ones_like(strip.porosity), grid.dx
         self._eps, self._c = eps, density / eps
         cells = np.arange(own)
         faces = strip.faces

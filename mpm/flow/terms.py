@@ -32,9 +32,9 @@ class Medium:
     """The gas and what it flows through, as cell functions: `density` is that of the carrier [SI], `buoyant` what it has more than the
     case's own, whose weight the pressure does not count.
 
-    `porosity` eps, `viscosity` mu_e, `resistance_x`, `resistance_y` mu/K [Pa s/m2], `moving_solid` 1 - eps in the moving layer and 0
-    elsewhere, `width` of the cells [m], `half_height` [m]: from a cell's centre to its bottom and top as shear feels it (see
-    `shear_distance`).
+    `porosity` eps, `inertial` what rho times du/dt is multiplied with, `viscosity` mu_e, `resistance_x`, `resistance_y` mu/K [Pa s/m2],
+    `moving_solid` 1 - eps in the moving layer and 0 elsewhere, `width` of the cells [m], `half_height` [m]: from a cell's centre to its
+    bottom and top as shear feels it (see `shear_distance`).
     """
 
     density: float | dolfinx.fem.Function
@@ -46,6 +46,8 @@ class Medium:
     moving_solid: dolfinx.fem.Function
     width: float
     half_height: dolfinx.fem.Function
+    inertial: dolfinx.fem.Function
+    superficial_drag: bool
 
     @classmethod
     def from_case(cls, case: Case, strip: Strip, gas: GasState | None = None) -> Medium:
@@ -59,6 +61,7 @@ class Medium:
         brinkman = grid.per_row(lambda solid: brinkman_length(solid, free_path), gas=np.inf)
         cells = {
             "porosity": porosity[row],
+            "inertial": (1.0 / porosity if case.porous.inertia == "interstitial" else porosity)[row],
             "viscosity": mu * grid.per_row(lambda solid: solid.viscosity_ratio, gas=1.0)[row],
             "resistance_x": mu / along[row],
             "resistance_y": mu / through[row],
@@ -66,11 +69,14 @@ class Medium:
             "half_height": shear_distance(grid.dy, brinkman)[row],
         }
         functions = {name: strip.cell_values(values, name) for name, values in cells.items()}
+        reference = case.motion.drag_reference == "superficial"
         if gas is None:
-            return cls(density=case.gas.density, buoyant=None, width=grid.dx, **functions)
+            return cls(
+                density=case.gas.density, buoyant=None, width=grid.dx, superficial_drag=reference, **functions
+            )
         density = strip.cell_values(gas.density, "density")
         buoyant = strip.cell_values(gas.buoyant, "buoyant")
-        return cls(density=density, buoyant=buoyant, width=grid.dx, **functions)
+        return cls(density=density, buoyant=buoyant, width=grid.dx, superficial_drag=reference, **functions)
 
 
 def brinkman_length(solid: Material, free_path: float = 0.0) -> float:
@@ -91,8 +97,9 @@ def shear_distance(heights: Floats, brinkman: Floats) -> Floats:
 
 
 def inertia(u: Expr, v: Expr, m: Medium) -> Form:
-    """(rho/eps) u . v, to be divided by the time step; here and in the convection the thesis has eps on rho v in the first term alone."""
-    return (m.density / m.porosity) * inner(u, v) * dx
+    """(rho/eps) u . v, to be divided by the time step; eps rho u . v as the thesis prints it (`porous.inertia`, here and in the
+    convection)."""
+    return (m.density * m.inertial) * inner(u, v) * dx
 
 
 def along(v: Expr, n: Expr) -> Expr:
@@ -125,8 +132,11 @@ def bed_entrainment(solids: Expr, v: Expr, m: Medium, closed: ufl.Measure) -> Fo
     """Right-hand side per unit bed velocity: (mu/K) eps v_s + div(mu_e grad((1-eps) v_s)), with `solids` = (1-eps) along x where v_s is.
 
     The second part is the shear of the solids' volume flux, which makes U the velocity that is continuous at the face of the bed: the gas
-    there moves with v_s, as a wall would move it.
+    there moves with v_s, as a wall would move it. With `motion.drag_reference = "superficial"` it is (mu/K) v_s alone: gas that follows the
+    bed has u = v_s, which is continuous at its face as it is, and carries 1/eps times the pore gas that goes with the bed.
     """
+    if m.superficial_drag:
+        return conditional(lt(0.0, m.moving_solid), 1.0, 0.0) * m.resistance_x * v[0] * dx
     moving = conditional(lt(0.0, m.moving_solid), m.porosity, 0.0)
     return moving * m.resistance_x * v[0] * dx - viscosity(solids, v, m, closed)
 

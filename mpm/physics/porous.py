@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from mpm.constants import GAS_CONSTANT
 
@@ -12,14 +12,23 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def effective_diffusivity[Value: (float, NDArray[np.float64])](
-    diffusivity: float | Value, porosity: Value, tortuosity_factor: Value
-) -> Value:
-    """D_eff = porosity D / tau^2 [m2/s], with D of free gas and tau^2 the tortuosity factor (TauFactor's, table 5.4 of the thesis).
+DiffusionLaw = Literal["effective", "free", "printed"]
 
-    Both are 1 in free gas. The thesis prints D eps/tau with tau a ratio of lengths (5-6) and leaves the flux in its porous zones
-    unreduced (5-12, 5-13): docs/source.md says what either changes. Numbers, or arrays with one for each row or cell.
+
+def effective_diffusivity[Value: (float, NDArray[np.float64])](
+    diffusivity: float | Value, porosity: Value, tortuosity_factor: Value, law: DiffusionLaw = "effective"
+) -> Value:
+    """What pores leave of a diffusivity D of free gas, D_eff [m2/s], by one of three laws; tau^2 is the tortuosity factor (TauFactor's).
+
+    effective: eps D/tau^2. printed: eps D/tau, as the thesis writes it (5-6), with tau a ratio of lengths and tau^2 in its table 5.4.
+    free: D, the unreduced flux of its porous zones (5-12, 5-13). All are D in free gas, where eps and tau^2 are 1. Numbers, or arrays with
+    one for each row or cell.
     """
+    if law == "free":
+        return diffusivity + 0.0 * porosity
+    if law == "printed":
+        root: Value = tortuosity_factor**0.5
+        return porosity * diffusivity / root
     return porosity * diffusivity / tortuosity_factor
 
 

@@ -102,6 +102,7 @@ def conditions(case: Case, schedule: Schedule) -> dict[str, Any]:
         "outlet": [(port.side, port.x0, port.x1) for port in geometry.outlets],
         "gas": (case.gas.density, case.gas.viscosity),
         "motion": case.motion,
+        "inertia": case.porous.inertia,
         "fidelity": (schedule.phases, begins_at_rest(case, schedule), _is_marched(case)),
     }
 
@@ -115,6 +116,8 @@ def dispersion_conditions(case: Case, diffusivities: list[float]) -> dict[str, A
         "steps per cycle": case.time.steps_per_cycle,
         "tortuosity": [layer.material and layer.material.tortuosity_factor for layer in case.geometry.layers],
         "inlet diffusion": case.geometry.inlet_diffusion,
+        "scheme": case.transport.scheme,
+        "diffusion in pores": case.porous.diffusion,
     }
 
 

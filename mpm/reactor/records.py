@@ -75,8 +75,9 @@ def cvd_rate(system: System) -> Floats:
     """Events of gas reactions that do not go back (`Mechanism.parasitic_reactions`) per total volume in own cells [mol/m3/s]."""
     transport, strip = system.transport, system.strip
     rates, _ = transport.reactions.gas.rates(transport.concentration[: transport.coupled])
+    share = transport.reactions.reacting_volume / strip.volume[: strip.owned]
     parasitic = [r.backward is None for r in transport.reactions.gas.reactions]
-    return np.asarray(rates[np.array(parasitic, dtype=bool)].sum(axis=0) * strip.porosity[: strip.owned])
+    return np.asarray(rates[np.array(parasitic, dtype=bool)].sum(axis=0) * share)
 
 
 def local_fields(system: System) -> dict[str, Floats]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mpm.arrays import Floats
+from mpm.case.conventions import conventions_of
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -124,6 +125,7 @@ def run_itself(records: Records) -> dict[str, Any]:
         "wall_seconds": records.wall,
         "revision": records.program,
         "versions": records.versions,
+        "conventions": conventions_of(records.case),
     }
 
 

@@ -44,7 +44,9 @@ class Diffusant:
         """What builds its flux operators in the state `gas`, or at that of the case; `dispersion` (2, local cells) is added to
         diffusion."""
         if gas is None:
-            effective = cell_diffusivity(strip, self.diffusivity, self.molar_mass, case.gas.temperature)
+            effective = cell_diffusivity(
+                strip, self.diffusivity, self.molar_mass, case.gas.temperature, case.porous.diffusion
+            )
             return FluxAssembler(case, strip, effective + dispersion)
         free = self.diffusivity * case.gas.diffusivity_factor(gas.temperature) / gas.pressure
         if self.mixed:
@@ -52,10 +54,11 @@ class Diffusant:
             free = free * diffusivity_ratio(
                 self.mixed, species, carrier.carrier, carrier.molar_mass, gas.fractions
             )
-        effective = cell_diffusivity(strip, free, self.molar_mass, gas.temperature)
+        law = case.porous.diffusion
+        effective = cell_diffusivity(strip, free, self.molar_mass, gas.temperature, law)
         drift = None
         if case.energy is not None and case.energy.soret:
-            drift = self._drift(case, strip, gas, hindered(effective, cell_diffusivity(strip, free)))
+            drift = self._drift(case, strip, gas, hindered(effective, cell_diffusivity(strip, free, law=law)))
         return FluxAssembler(case, strip, gas.relative * (effective + dispersion), gas.relative, drift)
 
     def _drift(self, case: Case, strip: Strip, gas: GasState, hindered: Floats) -> Floats:
@@ -66,7 +69,9 @@ class Diffusant:
         free = thermal_diffusion(self.molar_mass, case.gas.molar_mass, gas.temperature)
         towards_cold = 1.0 if self.molar_mass > case.gas.molar_mass else -1.0
         through = face_conductance(
-            strip, cell_diffusivity(strip, np.abs(free) / case.gas.molar_density) * hindered
+            strip,
+            cell_diffusivity(strip, np.abs(free) / case.gas.molar_density, law=case.porous.diffusion)
+            * hindered,
         )
         warmth = np.log(gas.temperature)
         return np.asarray(-towards_cold * through * (warmth[strip.faces.ahead] - warmth[strip.faces.behind]))

@@ -56,7 +56,9 @@ def vibrational_dispersion(
     for k, diffusivity in enumerate(diffusivities):
         tensor = dispersion_tensor(case, strip, fields, bed_motion.vibration.period, diffusivity)
         whole = strip.scatter.to_all(np.stack([tensor[0, 0], tensor[1, 1]]))[:, strip.cell]
-        result[k] = np.maximum(whole, (LEAST - 1.0) * cell_diffusivity(strip, diffusivity))
+        result[k] = np.maximum(
+            whole, (LEAST - 1.0) * cell_diffusivity(strip, diffusivity, law=case.porous.diffusion)
+        )
     return result
 
 
@@ -70,7 +72,8 @@ def dispersion_tensor(
     harmonics = np.fft.rfft(velocity, axis=0) / phases
     energy = total(strip.comm, (np.abs(harmonics) ** 2 * volume).sum(axis=(1, 2)))
     flow = face_flow(strip, mean_field(list(fields)).velocities)
-    operator = FluxAssembler(case, strip, cell_diffusivity(strip, diffusivity)).operator(flow)
+    effective = cell_diffusivity(strip, diffusivity, law=case.porous.diffusion)
+    operator = FluxAssembler(case, strip, effective).operator(flow)
     cells = CellMatrix(strip, 2)  # real and imaginary part
     diagonal = cells.set_fluxes([operator, operator])
     storage = strip.gas_volume[:own]

@@ -2,10 +2,9 @@
 
     div(u C - D_eff grad C),   D_eff = eps D / tau^2 per direction
 
-Between two cell centres the flux of the one-dimensional problem with constant velocity is exact (Scharfetter-Gummel, exponential
-fitting): F = g (B(-Pe) C_behind - B(Pe) C_ahead), B(z) = z / (exp z - 1), Pe = u / g, where 1/g is the sum of the half-cell
-resistances h / (2 D_eff). It is second order where diffusion dominates, upwind in the limit, and always gives an M-matrix:
-concentrations stay positive and within bounds. Fluxes are per metre of depth.
+Between two cell centres the flux of the one-dimensional problem with constant velocity is exact (exponential fitting): second order where
+diffusion dominates, upwind in the limit, and always an M-matrix. `mpm.transport.schemes` has it, and the cruder ones that a case may ask
+for (`transport.scheme`). Fluxes are per metre of depth.
 
 In gas that is not everywhere equally hot (`mpm.flow.state`) what is carried and what diffuses is the mole fraction x_i,
 
@@ -27,35 +26,25 @@ from mpm.arrays import Floats, Ints
 from mpm.flow.fields import FaceFlow, inlet_share
 from mpm.mesh.strip import Strip
 from mpm.parallel import any_rank
-from mpm.physics.exponentials import bernoulli
-from mpm.physics.porous import bosanquet, effective_diffusivity, knudsen_diffusivity
+from mpm.physics.porous import DiffusionLaw, bosanquet, effective_diffusivity, knudsen_diffusivity
+from mpm.transport.schemes import two_point_flux
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.ports import Inlet, Outlet
 
-PURE_UPWIND = 1e-12  # of the velocity: a conductance below that changes the flux by less than rounding
-
-
-def exponential_flux(velocity: Floats, conductance: Floats) -> tuple[Floats, Floats]:
-    """Coefficients (a, b) [m/s] of the flux a C_behind - b C_ahead for a face velocity [m/s] and conductance g [m/s].
-
-    g = 0 is legal and gives pure upwind; a - b = velocity always, and neither is negative, not even by rounding.
-    """
-    velocity, conductance = np.broadcast_arrays(np.asarray(velocity, float), np.asarray(conductance, float))
-    diffusing = conductance > PURE_UPWIND * np.abs(velocity)
-    g = np.where(diffusing, conductance, 1.0)
-    b = np.where(diffusing, g * bernoulli(velocity / g), np.maximum(-velocity, 0.0))
-    return np.maximum(b + velocity, 0.0), b
-
 
 def cell_diffusivity(
-    strip: Strip, diffusivity: float | Floats, molar_mass: float = 0.0, temperature: float | Floats = 0.0
+    strip: Strip,
+    diffusivity: float | Floats,
+    molar_mass: float = 0.0,
+    temperature: float | Floats = 0.0,
+    law: DiffusionLaw = "effective",
 ) -> Floats:
     """D_eff along x and y in every local cell, (2, cells) [m2/s], of a gas with this `diffusivity` [m2/s], one value or one per cell.
 
-    Where a solid has a pore_diameter, a gas of this `molar_mass` [kg/mol] meets its walls, too (Bosanquet), at the `temperature` [K]; one
-    without `molar_mass` does not.
+    `law`: what pores leave of it (`porous.diffusion`). Where a solid has a pore_diameter, a gas of this `molar_mass` [kg/mol] meets its
+    walls, too (Bosanquet), at the `temperature` [K]; one without `molar_mass` does not.
     """
     grid = strip.grid
     along_x = grid.per_row(lambda solid: solid.tortuosity_factor[0], gas=1.0)[strip.row]
@@ -69,7 +58,7 @@ def cell_diffusivity(
         walls = knudsen_diffusivity(width[narrow], molar_mass, hot[narrow])
         diffusivity[narrow] = bosanquet(free[narrow], walls)
     return np.stack(
-        [effective_diffusivity(diffusivity, strip.porosity, factor) for factor in (along_x, along_y)]
+        [effective_diffusivity(diffusivity, strip.porosity, factor, law) for factor in (along_x, along_y)]
     )
 
 
@@ -94,9 +83,9 @@ def face_conductance(strip: Strip, diffusivity: Floats) -> Floats:
 class PortFlux:
     """One port's exchange with its cells: species leave at `out` C_cell and enter at `into` C_port [m2/s each].
 
-    `area` (n,) is the open length of each cell's facet [m], `volume_in` the gas flow in through it [m2/s], below 0 where it flows out;
-    `weights` (n,) times the concentrations of the cells, summed up and over the sum of `area`, is the mean of what is next to the port.
-    Volumes are those at the state of `[gas]`, and so is C_port.
+    `area` (n,) is the open length of each cell's facet [m], `volume_in` the gas flow in through it [m2/s], below 0 where it flows out.
+    What an outlet draws back in is the mean of the cells `near` it: `weights` times their concentrations, summed up and over the sum of
+    their `sizes` (of an inlet, which draws nothing, there are none). Volumes are those at the state of `[gas]`, and so is C_port.
     """
 
     cells: Ints
@@ -104,7 +93,9 @@ class PortFlux:
     into: Floats
     area: Floats
     volume_in: Floats
+    near: Ints
     weights: Floats
+    sizes: Floats
 
     @property
     def volume_out(self) -> Floats:
@@ -151,7 +142,7 @@ class FluxAssembler:
     def operator(self, flow: FaceFlow) -> FluxOperator:
         """The operator of one velocity field; collective."""
         inner = flow.inner if self.drift is None else flow.inner + self.drift
-        from_behind, from_ahead = exponential_flux(inner, self.conductance)
+        from_behind, from_ahead = two_point_flux(inner, self.conductance, self.case.transport.scheme)
         if self.relative is not None:
             from_behind /= self.relative[self.strip.faces.behind]
             from_ahead /= self.relative[self.strip.faces.ahead]
@@ -194,10 +185,9 @@ class FluxAssembler:
         conductance = np.zeros_like(area)
         if self.case.geometry.inlet_diffusion:
             conductance = 2.0 * self.diffusivity[1][cells] / strip.height[cells]
-        into, out = exponential_flux(volume_in / area, conductance)
+        into, out = two_point_flux(volume_in / area, conductance, self.case.transport.scheme)
         leaving = self._per_concentration(out * area, cells)
-        weights = self._per_concentration(area, cells)
-        return PortFlux(cells, leaving, into * area, area, volume_in, weights)
+        return PortFlux(cells, leaving, into * area, area, volume_in, cells[:0], area[:0], area[:0])
 
     def _outlet(self, outlet: Outlet, flow: FaceFlow) -> PortFlux:
         """Convection alone: gas leaves with what its cell holds."""
@@ -207,8 +197,17 @@ class FluxAssembler:
         volume_in = flow.inward(outlet.side)[mine] * strip.grid.dx
         area = np.full(len(mine), strip.grid.dx)
         out, cells = np.maximum(-volume_in, 0.0), cells[mine]
-        leaving, weights = self._per_concentration(out, cells), self._per_concentration(area, cells)
-        return PortFlux(cells, leaving, np.maximum(volume_in, 0.0), area, volume_in, weights)
+        near = self._near(outlet)
+        leaving, sizes = self._per_concentration(out, cells), strip.volume[near]
+        weights = self._per_concentration(sizes, near)
+        return PortFlux(cells, leaving, np.maximum(volume_in, 0.0), area, volume_in, near, weights, sizes)
+
+    def _near(self, outlet: Outlet) -> Ints:
+        """Own cells whose mean the outlet draws back in: the rows next to it (`transport.backflow_rows`)."""
+        strip, own = self.strip, self.strip.owned
+        deep = strip.row[:own] if outlet.side == "bottom" else strip.grid.rows - 1 - strip.row[:own]
+        there = strip.grid.opening(outlet)[strip.column[:own]]
+        return np.flatnonzero((deep < self.case.transport.backflow_rows) & there)
 
     def _per_concentration(self, coefficients: Floats, cells: Ints) -> Floats:
         """Coefficients of the concentrations of `cells`, from those of what is carried."""

@@ -154,6 +154,6 @@ class HeatFluxes:
         ports = operator.fluxes.outlets
         sums = total(
             self.strip.comm,
-            [[float(excess[p.cells] @ p.weights), float(p.area.sum())] for p in ports.values()],
+            [[float(excess[p.near] @ p.weights), float(p.sizes.sum())] for p in ports.values()],
         )
         return {name: row[:1] / row[1] for name, row in zip(ports, sums, strict=True)}

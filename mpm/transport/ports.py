@@ -68,17 +68,17 @@ class Ports:
         return supply
 
     def outlet_means(self, operators: Sequence[FluxOperator], concentration: Floats) -> dict[str, Floats]:
-        """Area mean of the cells next to each outlet, (species,) [mol/m3 at the state of `[gas]`], where any outlet draws in (else
-        nothing); collective.
+        """Mean of the cells next to each outlet, (species,) [mol/m3 at the state of `[gas]`], where any outlet draws in (else nothing);
+        collective.
 
-        One row of cells; the thesis takes two.
+        One row of cells, or two as in the thesis (`transport.backflow_rows`).
         """
         if not operators or not operators[0].drawn_in:
             return {}
         operator = operators[0]
         sums = []
         for port in operator.outlets.values():
-            sums.append([*(concentration[:, port.cells] @ port.weights), port.area.sum()])
+            sums.append([*(concentration[:, port.near] @ port.weights), port.sizes.sum()])
         rows = total(self.strip.comm, sums)
         return {name: row[:-1] / row[-1] for name, row in zip(operator.outlets, rows, strict=True)}
 

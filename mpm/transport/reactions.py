@@ -41,7 +41,8 @@ class Events:
 class Reactions:
     """The reactions that run on the coverages and in the own cells of a strip, among the species of `roles`.
 
-    `surface` and `gas` are their kinetics; `species` the names of all species that run, reacting ones first. `tied` as in `_tied`.
+    `surface` and `gas` are their kinetics, `reacting_volume` (own,) [m2] what those of the gas run in (`porous.reaction_volume`); `species`
+    the names of all species that run, reacting ones first. `tied` as in `_tied`.
     """
 
     def __init__(self, case: Case, strip: Strip, coverage: Coverage, roles: Roles):
@@ -50,6 +51,8 @@ class Reactions:
         temperature = case.gas.temperature
         self.surface = surface_kinetics(case.mechanism, roles.coupled, coverage.sites, temperature)
         self.gas = gas_kinetics(case.mechanism, roles.coupled, strip.owned, temperature)
+        volume = strip.gas_volume if case.porous.reaction_volume == "gas" else strip.volume
+        self.reacting_volume = np.asarray(volume[: strip.owned])
         self._nu_surface = self._stoichiometry(self.surface.reactions)
         self._nu_gas = self._stoichiometry(self.gas.reactions)
         self.tied = self._tied()
@@ -100,8 +103,8 @@ class Reactions:
         return self.events(rates, self.none().gas)
 
     def events(self, surface_rates: Floats, gas_rates: Floats) -> Events:
-        """From rates per area (reactions, reactive cells) [mol/m2/s] and per volume of gas (reactions, own) [mol/m3/s]."""
-        return Events(surface_rates * self.coverage.area, gas_rates * self.gas_volume)
+        """From rates per area (reactions, reactive cells) [mol/m2/s] and per volume that they run in (reactions, own) [mol/m3/s]."""
+        return Events(surface_rates * self.coverage.area, gas_rates * self.reacting_volume)
 
     def made(self, events: Events, species: slice = slice(None)) -> Floats:
         """What they make of every one of these species, (species, own) [mol/m/s]."""
@@ -111,7 +114,7 @@ class Reactions:
 
     def slopes(self, surface_slopes: Floats, gas_slopes: Floats) -> Floats:
         """d `made` / dC of the coupled species, (own, coupled, coupled) [m2/s], from those of the rates (reactions, coupled, n)."""
-        slopes = _slopes(self._nu_gas[:, : self.coupled], gas_slopes, self.gas_volume)
+        slopes = _slopes(self._nu_gas[:, : self.coupled], gas_slopes, self.reacting_volume)
         slopes[self.coverage.cells] += _slopes(
             self._nu_surface[:, : self.coupled], surface_slopes, self.coverage.area
         )
@@ -128,7 +131,7 @@ class Reactions:
 
     def in_gas(self, cells: Ints, concentration: Floats) -> tuple[Floats, Floats]:
         """The same in the gas of own `cells` at these concentrations (coupled, n)."""
-        nu, volume = self._nu_gas[:, : self.coupled], self.gas_volume[cells]
+        nu, volume = self._nu_gas[:, : self.coupled], self.reacting_volume[cells]
         rates, slopes = self.gas.part(cells).rates(concentration)
         return nu.T @ rates * volume, _slopes(nu, slopes, volume)
 

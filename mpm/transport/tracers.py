@@ -57,7 +57,7 @@ def _fields(strip: Strip, operator: FluxOperator, supply: Floats) -> Floats:
     finally:
         solver.destroy()
     both, split = np.vstack([own, returned]), len(own)
-    sums = total(strip.comm, [[*(both[:, p.cells] @ p.weights), p.area.sum()] for p in ports])
+    sums = total(strip.comm, [[*(both[:, p.near] @ p.weights), p.sizes.sum()] for p in ports])
     means = sums[:, :-1] / sums[:, -1:]
     drawn = np.linalg.solve(np.eye(len(ports)) - means[:, split:], means[:, :split])
     return own + drawn.T @ returned

@@ -21,10 +21,10 @@ from mpm.mesh.strip import BOTTOM, RIGHT, TOP, Strip
 from mpm.numerics.fem import PETSc
 from mpm.numerics.linear import DirectSolver
 from mpm.numerics.sparse import sparse_matrix
-from mpm.physics.exponentials import bernoulli_slope
 from mpm.transport.cell_matrix import CellMatrix
 from mpm.transport.heat import Heat
 from mpm.transport.heat_flux import HeatOperator
+from mpm.transport.schemes import coefficient_slope
 
 if TYPE_CHECKING:
     from mpm.flow.problem import FlowProblem
@@ -97,9 +97,8 @@ class Overturning:
         space, strip, own = problem.space, self.strip, self.strip.owned
         faces = strip.faces
         excess = strip.scatter.to_all(self.heat.excess)[strip.cell]
-        conducts = operator.conductance > 0.0
-        g = np.where(conducts, operator.conductance, 1.0)
-        slope = np.where(conducts, bernoulli_slope(operator.velocity / g), -1.0 * (operator.velocity < 0.0))
+        scheme = self.heat.fluxes.case.transport.scheme
+        slope = coefficient_slope(operator.velocity, operator.conductance, scheme)
         passed = (1.0 + slope) * excess[faces.behind] - slope * excess[faces.ahead]
         sides = np.where(faces.vertical_flow, TOP, RIGHT)
         dofs = space.dofs[faces.behind, sides]

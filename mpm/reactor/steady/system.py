@@ -127,10 +127,10 @@ class SteadySystem:
             "means": Coupling(held, held),
         }
         for k, (mean, port) in enumerate(zip(means, self._drawing, strict=True)):
-            near = (gas[port.cells] + each).ravel()
-            number = np.repeat(mean + np.arange(coupled), len(port.cells))
-            couplings[f"gas by mean {k}"] = Coupling(near, number)
-            couplings[f"mean {k} by gas"] = Coupling(number, near)
+            beside, near = (gas[port.cells] + each).ravel(), (gas[port.near] + each).ravel()
+            number = mean + np.arange(coupled)
+            couplings[f"gas by mean {k}"] = Coupling(beside, np.repeat(number, len(port.cells)))
+            couplings[f"mean {k} by gas"] = Coupling(np.repeat(number, len(port.near)), near)
         return couplings
 
     def _gas_numbers(self) -> Ints:
@@ -199,7 +199,7 @@ class SteadySystem:
             "coverage": np.ones(free * len(moving)),
             "means": np.ones(self.unknowns.sizes["outlets"]),
         }
-        whole = total(self.strip.comm, [port.area.sum() for port in self._drawing])
+        whole = total(self.strip.comm, [port.sizes.sum() for port in self._drawing])
         for k, (port, area) in enumerate(zip(self._drawing, whole, strict=True)):
             values[f"gas by mean {k}"] = np.tile(-port.into, self.coupled)
             values[f"mean {k} by gas"] = np.tile(-port.weights / area, self.coupled)
