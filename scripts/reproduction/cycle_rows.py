@@ -28,6 +28,12 @@ def ports(width: str) -> dict[str, Any]:
     return {f"geometry.inlet.{name}.width": width for name in PORTS}
 
 
+def widths(lab: Lab) -> tuple[str, ...]:
+    """The port widths that rows are measured at: both, or the one of the setting."""
+    width = lab.setting.geometry.get("width")
+    return (width,) if width else WIDTHS
+
+
 def cycle_case(lab: Lab, width: str, changes: dict[str, Any] | None = None) -> Case:
     """The cycle at a port width, on the finest mesh there is."""
     return lab.best("cycle", {**ports(width), **STOICHIOMETRIC, "time.step": "40 ms", **(changes or {})})
@@ -58,7 +64,7 @@ def dose_ratios(case: Case) -> dict[str, float]:
 )
 def similar_boxes(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
-    for width in WIDTHS:
+    for width in widths(lab):
         run = lab.run(cycle_case(lab, width))
         tma, water = (column(run, f"titration.{name}.box_mean", 30.0, 60.4) for name in ("tma", "water"))
         difference = float((np.abs(tma - water) / np.maximum(tma, water)).max())
@@ -109,7 +115,7 @@ def similar_boxes(lab: Lab) -> Finding:
 )
 def overshoot(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
-    for width in WIDTHS:
+    for width in widths(lab):
         run = lab.run(cycle_case(lab, width))
         ratios = {}
         for zone in ("zone1", "zone2"):
@@ -136,7 +142,7 @@ def overshoot(lab: Lab) -> Finding:
 )
 def alike(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
-    for width in WIDTHS:
+    for width in widths(lab):
         run = lab.run(cycle_case(lab, width))
         places = {name: bed_front(run, name) for name in ("tma", "water")}
         tma, water = places.values()
@@ -162,7 +168,7 @@ def alike(lab: Lab) -> Finding:
 @row("R19", "5.14b", "CVD lies in the TMA zone", "more than 50 % of the integral in zone 1 at 60.4 s")
 def cvd_place(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
-    for width in WIDTHS:
+    for width in widths(lab):
         run = lab.run(cycle_case(lab, width))
         cvd = run.summary["cvd"]
         numbers[width] = {
@@ -190,7 +196,7 @@ def cvd_place(lab: Lab) -> Finding:
 )
 def cvd_rates(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
-    for width in WIDTHS:
+    for width in widths(lab):
         runs: dict[str, dict[str, Any]] = {"stoichiometric": {}, "rich": RICH, "delayed": DELAY}
         rates = {
             name: column(lab.run(cycle_case(lab, width, changes)), "cvd.rate_mean")
@@ -203,7 +209,7 @@ def cvd_rates(lab: Lab) -> Finding:
         checks.add(f"rich at least 10 times above, ports {width}", ratio >= 10.0)
         checks.add(f"start-up spike, ports {width}", peak["stoichiometric"] > 1.1)
         checks.add(f"removed by the delay, ports {width}", peak["delayed"] <= 1.1)
-    narrow = numbers[WIDTHS[-1]]
+    narrow = numbers[widths(lab)[-1]]
     peaks = {name: narrow["final"][name] * narrow["peak over final"][name] for name in narrow["final"]}
     reduced = peaks["delayed"] / peaks["stoichiometric"]
     measured = "; ".join(
@@ -228,7 +234,7 @@ def cvd_rates(lab: Lab) -> Finding:
 )
 def delay_harmless(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
-    for width in WIDTHS:
+    for width in widths(lab):
         with_, without = (
             column(lab.run(cycle_case(lab, width, changes)), "titration.water.box_mean", 30.0)
             for changes in (DELAY, {})
@@ -259,7 +265,7 @@ RATIOS = (0.5, 1.0, 2.0)
 def cvd_map(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
     ratios = RATIOS
-    for width in WIDTHS:
+    for width in widths(lab):
         base = dose_ratios(lab.case("cycle", "coarse", {**ports(width), **STOICHIOMETRIC}))
         rate, film, feed = (np.zeros((len(ratios), len(ratios))) for _ in range(3))
         for i, tma in enumerate(ratios):

@@ -60,6 +60,38 @@ def _highest(y: Floats, values: Floats, level: float) -> float:
     return float(y[i] + (values[i] - level) / (values[i] - values[i + 1]) * (y[i + 1] - y[i]))
 
 
+def early_case(lab: Lab, mesh: str, startup: str, frame: str, gamma: float) -> Case:
+    """The zone until 1.925 s with its vibration resolved."""
+    changes = {
+        "fidelity": "resolved",
+        "time.steps_per_cycle": 16,
+        "motion.startup": startup,
+        "motion.inlet_frame": frame,
+        "motion.gamma": gamma,
+        **EARLY,
+    }
+    return lab.case("zone", mesh, changes)
+
+
+def spreads(lab: Lab, mesh: str, startup: str, frame: str) -> dict[str, Any]:
+    """Where TMA stands at 1.925 s at both Gamma, and which of the four orderings hold."""
+    low, high = (spread(lab.run(early_case(lab, mesh, startup, frame, gamma))) for gamma in (0.3, 0.6))
+    holds = [text for text in ORDERS if high[text] > 1.01 * low[text]]
+    return {"gamma 0.3": low, "gamma 0.6": high, "holds": holds}
+
+
+def spreads_text(numbers: dict[str, Any]) -> str:
+    """One line of what `spreads` has measured, by the name of the configuration."""
+    return "; ".join(
+        f"{name}: {len(n['holds'])} of {len(ORDERS)} ("
+        + ", ".join(
+            f"{text} {n['gamma 0.3'][text] * MM:.2f} to {n['gamma 0.6'][text] * MM:.2f} mm" for text in ORDERS
+        )
+        + ")"
+        for name, n in numbers.items()
+    )
+
+
 @row(
     "R6",
     "5.9a,b",
@@ -71,36 +103,10 @@ def vibration_spreads(lab: Lab) -> Finding:
     checks, numbers = Checks(), dict[str, Any]()
     for startup, state in (("impulsive", "start-up"), ("developed", "developed")):
         for frame in ("reactor", "lab"):
-            runs = [
-                lab.run(
-                    lab.case(
-                        "zone",
-                        "medium",
-                        {
-                            "fidelity": "resolved",
-                            "time.steps_per_cycle": 16,
-                            "motion.startup": startup,
-                            "motion.inlet_frame": frame,
-                            "motion.gamma": gamma,
-                            **EARLY,
-                        },
-                    )
-                )
-                for gamma in (0.3, 0.6)
-            ]
             name = f"{state}, inlets in the {frame}'s frame"
-            low, high = (spread(run) for run in runs)
-            holds = [text for text in ORDERS if high[text] > 1.01 * low[text]]
-            numbers[name] = {"gamma 0.3": low, "gamma 0.6": high, "holds": holds}
-            checks.add(name, len(holds) == len(ORDERS))
-    measured = "; ".join(
-        f"{name}: {len(n['holds'])} of {len(ORDERS)} ("
-        + ", ".join(
-            f"{text} {n['gamma 0.3'][text] * MM:.2f} to {n['gamma 0.6'][text] * MM:.2f} mm" for text in ORDERS
-        )
-        + ")"
-        for name, n in numbers.items()
-    )
+            numbers[name] = spreads(lab, "medium", startup, frame)
+            checks.add(name, len(numbers[name]["holds"]) == len(ORDERS))
+    measured = spreads_text(numbers)
     found = [f"{', '.join(n['holds'])} ({name})" for name, n in numbers.items() if n["holds"]]
     why = (
         "Measured are the height of the contour C0/10 above the frit's underside, how far upstream of the inlet the "
@@ -152,12 +158,12 @@ def late(run: Run, since: float = 5.0) -> Floats:
     return run.history["titration.tma.box_mean"][run.history["time"] >= since - 1e-9]
 
 
-def pulse_case(lab: Lab, mesh: str, startup: str, frame: str, gamma: float) -> Case:
-    """6.5 s of the zone with its vibration resolved."""
+def pulse_case(lab: Lab, mesh: str, startup: str, frame: str, gamma: float, end: str = "6.5 s") -> Case:
+    """The zone until `end` with its vibration resolved."""
     changes = {
         "fidelity": "resolved",
         "time.steps_per_cycle": 16,
-        "time.end": "6.5 s",
+        "time.end": end,
         "output.every": "0.5 s",
         "motion.startup": startup,
         "motion.inlet_frame": frame,

@@ -1,0 +1,199 @@
+"""The two columns of the document: verdicts under both conventions, with which revision, and the switches that turn a row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from reproduction import ROWS
+from reproduction.row import HOLDS
+from reproduction.settings import alone
+from reproduction.thesis_mesh import AT_THESIS_COLUMNS, STATES
+
+Found = dict[str, dict[str, Any]]
+"""Findings by row."""
+NAMES = {"mpm": "mpm", "closed-code": "closed code"}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What has been measured: findings by row under both conventions, by switch alone, and at the thesis' columns by convention."""
+
+    mpm: Found
+    closed: Found
+    alone: dict[str, Found]
+    fine: dict[str, Found]
+
+    @property
+    def both(self) -> dict[str, Found]:
+        return {"mpm": self.mpm, "closed-code": self.closed}
+
+    @property
+    def turned(self) -> list[str]:
+        """Rows measured under both conventions whose verdicts differ."""
+        return [
+            name
+            for name in ROWS
+            if name in self.mpm
+            and name in self.closed
+            and self.mpm[name]["verdict"] != self.closed[name]["verdict"]
+        ]
+
+
+def programs(found: Found) -> set[str]:
+    """Revisions that a column's findings and their runs were made with, without the commit: version and digest decide numbers."""
+    texts = [
+        text
+        for one in found.values()
+        for text in (one.get("revision", "unknown"), *one.get("runs by", ["unknown"]))
+    ]
+    return {text.partition(", commit ")[0] for text in texts}
+
+
+def commits(found: Found) -> set[str]:
+    """The whole revisions, with their commits."""
+    return {one.get("revision", "unknown") for one in found.values()}
+
+
+def revision_text(columns: Columns) -> str:
+    """With which revision the columns were measured; that they differ when they do."""
+    used = {name: programs(found) for name, found in columns.both.items() if found}
+    everything: set[str] = set().union(*used.values())
+    if not everything:
+        return ""
+    if len(everything) == 1 and "unknown" not in everything:
+        texts = "; ".join(sorted(set().union(*(commits(found) for found in columns.both.values()))))
+        which = "Both columns were" if len(used) == 2 else "The column was"
+        return f"{which} measured with one revision of the program: {texts}.\n\n"
+    parts = "; ".join(f"*{NAMES[name]}* with {' and '.join(sorted(texts))}" for name, texts in used.items())
+    return (
+        f"**The columns were not measured with one revision of the program:** {parts}. Where they differ, the program may be the "
+        "reason and not the conventions.\n\n"
+    )
+
+
+def strays(columns: Columns, geometry: dict[str, Found]) -> str:
+    """Which of the other measurements were made with a program that neither column was measured with."""
+    known = programs(columns.mpm) | programs(columns.closed)
+    parts = {f"the switch `{key}` alone": found for key, found in columns.alone.items()}
+    parts |= {f"the thesis' columns, *{NAMES[key]}*": found for key, found in columns.fine.items()}
+    parts |= {f"geometry, {point}": found for point, found in geometry.items()}
+    lines = [
+        f"* {what}: {' and '.join(sorted(programs(found) - known))}."
+        for what, found in parts.items()
+        if not programs(found) <= known
+    ]
+    return (
+        "**Measured with another revision than the columns:**\n\n" + "\n".join(lines) + "\n\n"
+        if lines
+        else ""
+    )
+
+
+def counts(name: str, found: Found) -> str:
+    """How many rows hold in a column."""
+    holds = sum(one["verdict"] == HOLDS for one in found.values())
+    fails = sum(one["verdict"].startswith("not") for one in found.values())
+    return (
+        f"*{NAMES[name]}*: of {len(found)} rows measured {holds} are reproduced, {fails} are not, "
+        f"{len(found) - holds - fails} are reproduced in part or under a condition."
+    )
+
+
+def _cells(found: dict[str, Any] | None, fine: dict[str, Any] | None) -> tuple[str, str]:
+    """Measured and verdict of a row in a column, at the thesis' columns too where that was measured."""
+    measured, verdict = (found["measured"], f"**{found['verdict']}**") if found else ("", "not measured")
+    if fine:
+        measured += f"; at the thesis' columns: {fine['measured']}"
+        verdict += f"; at the thesis' columns: **{fine['verdict']}**"
+    return measured, verdict
+
+
+def _used(columns: Columns, name: str) -> str:
+    """Meshes and fidelities of a row: of both columns where they are not the same."""
+    texts = {key: found[name]["used"] for key, found in columns.both.items() if name in found}
+    same = len(set(texts.values())) == 1
+    used = next(iter(texts.values())) if same else "; ".join(f"*{NAMES[k]}*: {t}" for k, t in texts.items())
+    fine = next((found[name]["used"] for found in columns.fine.values() if name in found), "")
+    return "; ".join(text for text in (used, fine) if text)
+
+
+def table(columns: Columns) -> str:
+    """The table of all rows; one that has not been measured says so."""
+    lines = [
+        "| | figure | statement | expected | measured | verdict | measured, closed code | verdict, closed code "
+        "| mesh: fidelity | command |",
+        "|---" * 10 + "|",
+    ]
+    for name, row in ROWS.items():
+        cells = [name, row.figure, row.statement, row.expected]
+        for key, found in columns.both.items():
+            cells += _cells(found.get(name), columns.fine.get(key, {}).get(name))
+        cells += [_used(columns, name), f"`scripts/reproduce.py {name}`"]
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    summary = " ".join(counts(name, found) for name, found in columns.both.items() if found)
+    return "## Verdicts\n\n" + summary + "\n\n" + revision_text(columns) + "\n".join(lines) + "\n\n"
+
+
+def turning(columns: Columns, name: str) -> dict[str, str]:
+    """What each switch alone does to the verdict of a row: "all of it", "part of it", "nothing" or "not measured".
+
+    "All of it" is the closed code's verdict, "part of it" one that is neither that nor the model's own.
+    """
+    own, closed = columns.mpm[name]["verdict"], columns.closed[name]["verdict"]
+    found = {}
+    for key in alone():
+        one = columns.alone.get(key, {}).get(name)
+        verdict = one["verdict"] if one else None
+        found[key] = {None: "not measured", own: "nothing", closed: "all of it"}.get(verdict, "part of it")
+    return found
+
+
+def turns_text(columns: Columns) -> str:
+    """The rows whose verdicts differ between the conventions, and which switch turns each, alone."""
+    text = "## Rows that turn with the conventions\n\n"
+    if not columns.turned:
+        return text + "Of the rows measured under both conventions none.\n\n"
+    text += (
+        "Each switch of the preset was set alone in the model's own conventions (`scripts/reproduce.py --switches R8`). "
+        "*All of it*: the verdict is then the closed code's; *part of it*: it is neither this nor the model's own.\n\n"
+    )
+    text += (
+        "| | verdict | verdict, closed code | all of it | part of it | nothing | not measured |\n"
+        + "|---" * 7
+        + "|\n"
+    )
+    for name in columns.turned:
+        effects = turning(columns, name)
+        cells = [name, columns.mpm[name]["verdict"], columns.closed[name]["verdict"]]
+        for effect in ("all of it", "part of it", "nothing", "not measured"):
+            keys = [f"`{key}`" for key, what in effects.items() if what == effect]
+            cells.append(", ".join(keys) or "none" if effect != "not measured" else ", ".join(keys))
+        text += "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
+    return text + "\n" + details(columns) + "\n"
+
+
+def details(columns: Columns) -> str:
+    """What was measured under each switch that turns a row."""
+    lines = []
+    for name in columns.turned:
+        for key, effect in turning(columns, name).items():
+            if effect in ("all of it", "part of it"):
+                one = columns.alone[key][name]
+                lines.append(f"* **{name}**, `{key}` alone: {one['measured']}: {one['verdict']}.\n")
+    return "".join(lines)
+
+
+def missing_text(columns: Columns) -> str:
+    """What the document asks for and has not been measured."""
+    lines = []
+    for key, found in columns.both.items():
+        rows = [name for name in ROWS if name not in found]
+        if rows:
+            lines.append(f"* *{NAMES[key]}*: {', '.join(rows)}.")
+        fine = columns.fine.get(key, {})
+        for name in AT_THESIS_COLUMNS:
+            lacking = [state for _, state in STATES if state not in fine.get(name, {}).get("numbers", {})]
+            if lacking:
+                lines.append(f"* {name} at the thesis' columns, *{NAMES[key]}*: {', '.join(lacking)}.")
+    return "Not measured:\n\n" + "\n".join(lines) + "\n\n" if lines else ""
