@@ -25,6 +25,7 @@ ANSWER, CONVENTIONS = ROOT / "docs" / "vibration.md", ROOT / "docs" / "conventio
 PICTURE = ROOT / "docs" / "figures" / "vibration.png"
 SECTIONS: dict[str, Callable[[Lab], str]] = {
     "readings": readings.table,
+    "steps": readings.steps,
     "dispersion": dispersion.table,
     "added": dispersion.added,
     "columns": columns.table,
@@ -59,7 +60,9 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--table", action="store_true", help="the section readings")
     parser.add_argument("--width", type=float, nargs="*", default=WIDTHS, help="mm: columns to run")
     parser.add_argument("--stored", action="store_true", help="run nothing")
-    parser.add_argument("--coarse", action="store_true", help="a coarse mesh and short runs; nothing is written")
+    parser.add_argument(
+        "--coarse", action="store_true", help="a coarse mesh and short runs; nothing is written"
+    )
     chosen = parser.parse_args(arguments)
     unknown = set(chosen.sections) - set(SECTIONS)
     if unknown:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 SMEARED = 0.1
 """Numerical over molecular diffusion along x that deserves a warning: 0.44 raised the coverage before the inlet by 0.008 in the zone, 0.19
-by 0.002 (docs/open_question.md)."""
+by 0.002 (docs/vibration.md)."""
 CONTINUUM = 0.01
 """Knudsen number of the pores from which slip counts: it adds 8 Kn to the permeability (Klinkenberg 1941), 8 % here."""
 FEW = 10.0

@@ -234,7 +234,7 @@ def box_mean(lab: Lab) -> Finding:
         "Gains are those of the coarse mesh, their mesh error the difference to the medium mesh in the developed state with "
         "inlets fixed to the reactor, where the gain at 6.5 s is "
         f"{gains['coarse'][-1]:+.4f} on the coarse and {gains['medium'][-1]:+.4f} on the medium mesh. Upwinding of "
-        "the gas that swings adds to diffusion along wide columns, the more so the larger Gamma (docs/open_question.md), "
+        "the gas that swings adds to diffusion along wide columns, the more so the larger Gamma (docs/vibration.md), "
         "so a gain that shrinks with the column is the mesh's. A bed that moves faster brings more fresh sites into the "
         "box, but TMA gas that it drags around the periodic strip reaches the box from the other side: at Y 1e-3 the box fills "
         f"up within 20 s at every speed, and the largest reversal of the order is {-falls:.2f}."

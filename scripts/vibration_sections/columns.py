@@ -1,11 +1,11 @@
-"""What resolving the vibration adds to its average, in columns of several widths: the frit saturated, Y_TMA = 2e-4, two passes of the bed."""
+"""What resolving the vibration adds to its average, by width of the columns: frit saturated, Y_TMA = 2e-4, two passes of the bed."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from meshes import rows
-from vibration_sections.extrapolation import to_zero
+from vibration_sections.extrapolation import tends
 from vibration_sections.store import GAMMAS, SITE, WIDTHS, Lab, box, less, markdown, shown
 
 SPEED = 0.013  # m/s
@@ -72,9 +72,8 @@ def table(lab: Lab) -> str:
     lines, means = [], []
     for numerics in NUMERICS:
         for name, values in differences(lab, numerics).items():
-            limit = to_zero(WIDTHS, values)
-            end = "–" if limit is None else f"{limit[0]:+.4f} ({limit[1]:.1f})"
-            lines.append([numerics, name, *(shown(value, "+.4f") for value in values), end])
+            changed = (shown(value, "+.4f") for value in values)
+            lines.append([numerics, name, *changed, tends(WIDTHS, values)])
         runs: dict[str, list[float | None]] = {
             "averaged": [averaged(lab, numerics, width) for width in WIDTHS],
             **{

@@ -1,4 +1,4 @@
-"""How large dispersion by vibration is: closed form, all layers in theory, mpm's cell problem; and what numerics add on the thesis' mesh."""
+"""How large dispersion by vibration is: closed form, theory of all layers, mpm's cell problem; what numerics add on the thesis' mesh."""
 
 from __future__ import annotations
 
@@ -72,7 +72,8 @@ def table(lab: Lab) -> str:
         values = [alone["plenum"], alone["headspace"]]
         values += [whole[name] for name in ("plenum", "bed", "headspace")]
         found = [
-            None if cells is None else PERCENT * cells[name] for name in ("plenum", "frit", "bed", "headspace")
+            None if cells is None else PERCENT * cells[name]
+            for name in ("plenum", "frit", "bed", "headspace")
         ]
         lines.append(
             [f"{gamma:g}", *(f"{PERCENT * v:.3f}" for v in values), *(shown(v, ".3f") for v in found)]

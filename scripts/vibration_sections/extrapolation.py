@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 LOWEST, HIGHEST = 0.25, 4.0
 """Orders between which the observed one is looked for."""
 BISECTIONS = 60
@@ -41,11 +39,7 @@ def to_zero(widths: Sequence[float], values: Sequence[float | None]) -> tuple[fl
     return float(f3 - slope * h3**order), float(order)
 
 
-def line(widths: Sequence[float], values: Sequence[float | None], order: float) -> tuple[float, float] | None:
-    """(limit, coefficient) of value(h) = limit + c h^order through the two narrowest columns; None where fewer are measured."""
-    known = sorted((h, f) for h, f in zip(widths, values, strict=True) if f is not None)
-    if len(known) < 2:
-        return None
-    (h2, f2), (h1, f1) = known[:2]
-    c = (f1 - f2) / np.float64(h1**order - h2**order)
-    return float(f2 - c * h2**order), float(c)
+def tends(widths: Sequence[float], values: Sequence[float | None]) -> str:
+    """Limit and order for a table, or a dash."""
+    found = to_zero(widths, values)
+    return "–" if found is None else f"{found[0]:+.4f} ({found[1]:.1f})"

@@ -51,8 +51,10 @@ def gains(panel: Axes, lab: Lab) -> None:
     panel.axhline(0.0, color="0.3", linewidth=0.9)
     panel.set_xlim(left=0.0)
     panel.set_title("coverage gained by shaking twice as hard (Γ 0.3 to 0.6)", fontsize=10)
-    panel.set_ylabel("gain of the box mean at 6.5 s")
-    panel.legend(fontsize=8, loc="upper left", title="open: extrapolated; dashed: the source's mesh", title_fontsize=8)
+    panel.set_ylabel("gain of the box mean, 5.5 to 6.5 s")
+    panel.legend(
+        fontsize=8, loc="upper left", title="open: extrapolated; dashed: the source's mesh", title_fontsize=8
+    )
 
 
 def diffusion(panel: Axes, lab: Lab) -> None:
@@ -62,12 +64,16 @@ def diffusion(panel: Axes, lab: Lab) -> None:
         case = lab.case(dispersion.BASE, {}, width=dispersion.CELL_WIDTH, gamma=gamma)
         bed = next(layer for layer in theory.layers(case) if layer.name == "bed")
         for colour, (scheme, name) in zip(
-            OKABE_ITO, {"fitted": "exponential fitting (mpm)", "upwind": "first-order upwinding"}.items(), strict=False
+            OKABE_ITO,
+            {"fitted": "exponential fitting (mpm)", "upwind": "first-order upwinding"}.items(),
+            strict=False,
         ):
             share = [dispersion.PERCENT * theory.added_by_scheme(bed, 1e-3 * h, scheme) for h in widths]
             panel.plot(widths, share, dashes, color=colour, label=f"{name}, Γ {gamma:g}")
         real = dispersion.PERCENT * dispersion.in_layers(lab, gamma)["bed"]
-        panel.plot(widths, np.full_like(widths, real), dashes, color="black", label=f"vibration itself, Γ {gamma:g}")
+        panel.plot(
+            widths, np.full_like(widths, real), dashes, color="black", label=f"vibration itself, Γ {gamma:g}"
+        )
     panel.set(xscale="log", yscale="log", xlim=(0.1, 3.0))
     panel.set_title("what adds to diffusion along the bed", fontsize=10)
     panel.set_ylabel("added [% of the bed's D_eff]")

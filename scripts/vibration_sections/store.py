@@ -56,7 +56,7 @@ class Lab:
         """Numbers of a run, made where it is not stored and its columns are to be run; None where it is missing.
 
         `box_mean`, `exit_mean`: coverage before the precursor and of what leaves, means over the last `window` [s] and at least the
-        last output.
+        last output; `box_mean_at_end` at that alone.
         """
         wanted = any(np.isclose(1e3 * case.geometry.cell_width, width, rtol=0.05) for width in self.widths)
         return self.kept(label, case, lambda: _measure(case, window), run=self.coarse or wanted)
@@ -117,6 +117,7 @@ def _measure(case: Case, window: float) -> Numbers:
     means = np.mean(seen, axis=0)
     return {
         "box_mean": float(means[0]),
+        "box_mean_at_end": seen[-1][0],
         "exit_mean": float(means[1]),
         "x_CH4": float(np.mean(result.history["outlets.zone1.x.CH4"][-len(seen) :])),
         "cells": float(reactor.grid.cells),
@@ -135,9 +136,9 @@ def shown(value: float | None, form: str) -> str:
     return "–" if value is None else format(value, form)
 
 
-def box(found: Numbers | None) -> float | None:
+def box(found: Numbers | None, name: str = "box_mean") -> float | None:
     """The box mean of a run that may be missing."""
-    return None if found is None else found["box_mean"]
+    return None if found is None else found[name]
 
 
 def less(a: float | None, b: float | None) -> float | None:

@@ -59,7 +59,10 @@ def signals(case: Case) -> tuple[Complex, Complex, float]:
     middle = 0.5 * (times[1:] + times[:-1])
     frame = np.array([vibration.velocity(t)[0] for t in middle])
     # phases count from the middle of the first step; the same turn for both leaves K and |u| as they are
-    solid, moved = (2.0 * np.fft.rfft(v)[1 : HARMONICS + 1] / PHASES for v in (slid, frame))
+    solid, moved = (
+        np.asarray(2.0 * np.fft.rfft(v)[1 : HARMONICS + 1] / PHASES, dtype=np.complex128)
+        for v in (slid, frame)
+    )
     return solid, moved, float(slid.mean())
 
 
