@@ -21,6 +21,7 @@ from reproduction.columns import (  # noqa: E402
     Found,
     missing_text,
     revision_text,
+    source,
     strays,
     table,
     turning,
@@ -142,6 +143,19 @@ def test_row_that_turns_names_its_switches() -> None:
         SWITCHES[-1]: "not measured",
     }
     assert f"| `{SWITCHES[0]}` | `{SWITCHES[1]}` | `{SWITCHES[2]}`" in turns_text(found)
+
+
+def test_switches_of_the_coarsest_mesh_stand_in_only_where_verdicts_agree() -> None:
+    """Fails when switches measured on a mesh with other verdicts explain a row, or those of its own meshes are passed over."""
+    one = {SWITCHES[0]: {"R18": finding("not reproduced")}}
+    full = columns({"R18": finding()}, {"R18": finding("not reproduced")})
+    agreeing = columns({"R18": finding()}, {"R18": finding("not reproduced")}, one)
+    other = columns({"R18": finding("in part")}, {"R18": finding("not reproduced")}, one)
+    assert source(full, agreeing, "R18") is agreeing
+    assert "R18 (coarsest mesh" in turns_text(full, agreeing)
+    assert source(full, other, "R18") is full
+    assert source(agreeing, other, "R18") is agreeing
+    assert source(full, None, "R18") is full
 
 
 def test_table_states_both_conventions_and_both_meshes() -> None:

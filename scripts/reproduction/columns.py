@@ -132,6 +132,8 @@ def table(columns: Columns) -> str:
         cells += [_used(columns, name), f"`scripts/reproduce.py {name}`"]
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     summary = " ".join(counts(name, found) for name, found in columns.both.items() if found)
+    if columns.turned:
+        summary += f" Verdicts differ in {len(columns.turned)} rows: {', '.join(columns.turned)}."
     return "## Verdicts\n\n" + summary + "\n\n" + revision_text(columns) + "\n".join(lines) + "\n\n"
 
 
@@ -149,7 +151,22 @@ def turning(columns: Columns, name: str) -> dict[str, str]:
     return found
 
 
-def turns_text(columns: Columns) -> str:
+def source(columns: Columns, coarse: Columns | None, name: str) -> Columns:
+    """Where the switches of a row are taken from: its own meshes, or the coarsest where they were measured there alone.
+
+    The coarsest mesh counts only where both verdicts there are those of the columns.
+    """
+    here = any(name in found for found in columns.alone.values())
+    if here or coarse is None or not any(name in found for found in coarse.alone.values()):
+        return columns
+    same = all(
+        found.get(name, {}).get("verdict") == columns.both[key][name]["verdict"]
+        for key, found in coarse.both.items()
+    )
+    return coarse if same else columns
+
+
+def turns_text(columns: Columns, coarse: Columns | None = None) -> str:
     """The rows whose verdicts differ between the conventions, and which switch turns each, alone."""
     text = "## Rows that turn with the conventions\n\n"
     if not columns.turned:
@@ -164,22 +181,25 @@ def turns_text(columns: Columns) -> str:
         + "|\n"
     )
     for name in columns.turned:
-        effects = turning(columns, name)
-        cells = [name, columns.mpm[name]["verdict"], columns.closed[name]["verdict"]]
+        measured = source(columns, coarse, name)
+        effects = turning(measured, name)
+        mesh = " (coarsest mesh, where both verdicts are the same)" if measured is coarse else ""
+        cells = [name + mesh, columns.mpm[name]["verdict"], columns.closed[name]["verdict"]]
         for effect in ("all of it", "part of it", "nothing", "not measured"):
             keys = [f"`{key}`" for key, what in effects.items() if what == effect]
             cells.append(", ".join(keys) or "none" if effect != "not measured" else ", ".join(keys))
         text += "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
-    return text + "\n" + details(columns) + "\n"
+    return text + "\n" + details(columns, coarse) + "\n"
 
 
-def details(columns: Columns) -> str:
+def details(columns: Columns, coarse: Columns | None) -> str:
     """What was measured under each switch that turns a row."""
     lines = []
     for name in columns.turned:
-        for key, effect in turning(columns, name).items():
+        measured = source(columns, coarse, name)
+        for key, effect in turning(measured, name).items():
             if effect in ("all of it", "part of it"):
-                one = columns.alone[key][name]
+                one = measured.alone[key][name]
                 lines.append(f"* **{name}**, `{key}` alone: {one['measured']}: {one['verdict']}.\n")
     return "".join(lines)
 

@@ -13,19 +13,19 @@ from reproduction.row import HOLDS
 from reproduction.settings import REFERENCE, Setting
 
 ROW_NAMES = ("R13", "R16", "R17", "R18", "R20", "R21")
-MESH = "light"
+MESH = "coarse"
 POINTS: dict[str, dict[str, str]] = {
     "base": {},
     "headspace 9.7 mm": {"headspace": "9.7 mm"},
     "626 Torr": {"pressure": "626 Torr"},
     "ports 2.2 mm": {"width": "2.2 mm"},
-    "ports 3.0 mm": {"width": "3.0 mm"},
     "ports 4.8 mm": {"width": "4.8 mm"},
     "as printed, ports 4.0 mm": {"headspace": "9.7 mm", "pressure": "626 Torr"},
     "as printed, ports 4.8 mm": {"headspace": "9.7 mm", "pressure": "626 Torr", "width": "4.8 mm"},
     "as printed, ports 2.2 mm": {"headspace": "9.7 mm", "pressure": "626 Torr", "width": "2.2 mm"},
+    "ports 3.0 mm": {"width": "3.0 mm"},
 }
-"""What each point changes of REFERENCE: one at a time, then all that is printed at three widths, which are not."""
+"""What each point changes of REFERENCE: one at a time, then all that is printed at three widths, which are not, and a width between."""
 MM = 1e3
 
 

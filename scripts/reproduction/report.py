@@ -123,10 +123,11 @@ def write_report(lab: Lab, pictures: bool, document: Path = DOCUMENT) -> None:
         draw(stored, figures)
         draw_streams(stored, figures)
     columns = columns_of(lab)
+    coarse = columns_of(replace(lab, folder=lab.folder.parent / "coarse", coarse=True))
     points = settings()
     sweep = {name: found_by(lab, points[name], ROW_NAMES) for name in POINTS}
     text = INTRODUCTION + meshes_text() + table(columns) + strays(columns, sweep) + missing_text(columns)
-    text += turns_text(columns) + section(sweep) + CRITERIA + paragraphs(columns.mpm)
+    text += turns_text(columns, coarse) + section(sweep) + CRITERIA + paragraphs(columns.mpm)
     text += "## Pictures\n\n"
     for name, (_, caption) in {**STREAMS, **PICTURES}.items():
         file = next((f for f in (f"{name}.png", f"{name}.gif") if (figures / f).exists()), None)
