@@ -9,6 +9,7 @@ import pytest
 from mpm.advice import engineering as eng
 from mpm.advice.checks import check_case
 from mpm.case.case import Case, load_case
+from mpm.case.throughflow import flow_resistance, rising_velocity, spreading_length
 from mpm.cli import main
 from mpm.mesh.grid import Grid
 from mpm.report.dosing import inlet_excess
@@ -110,13 +111,14 @@ def test_dose_ratio_of_water_counts_three_molecules_for_two_sites() -> None:
 def test_gas_spreads_in_the_plenum(case: Case) -> None:
     """Spreading length 3.7 m against a strip of 0.14 m: gas rises evenly. A tight plenum keeps it over the port."""
     even = (2 * 0.035 * 4e-3) / 0.1397
-    assert eng.spreading_length(case) == pytest.approx(3.654, rel=1e-3)
-    assert eng.rising_velocity(case, 0.1048) == pytest.approx(even, rel=1e-3)
-    tight = case.with_({"geometry.layer.plenum.height": "0.1 mm"})
-    decay = eng.spreading_length(tight)
-    assert decay == pytest.approx(math.sqrt(1e-12 * eng.flow_resistance(tight) / 12.0), rel=1e-12)
-    assert eng.rising_velocity(tight, 0.1048) == pytest.approx(0.035 * 4e-3 / (2 * decay), rel=0.01)
-    assert eng.rising_velocity(tight, 0.07) < 0.2 * eng.rising_velocity(tight, 0.1048)
+    path = case.gas.mean_free_path
+    assert spreading_length(case.geometry, path) == pytest.approx(3.654, rel=1e-3)
+    assert rising_velocity(case.geometry, path, 0.1048) == pytest.approx(even, rel=1e-3)
+    tight = case.with_({"geometry.layer.plenum.height": "0.1 mm"}).geometry
+    decay = spreading_length(tight, path)
+    assert decay == pytest.approx(math.sqrt(1e-12 * flow_resistance(tight, path) / 12.0), rel=1e-12)
+    assert rising_velocity(tight, path, 0.1048) == pytest.approx(0.035 * 4e-3 / (2 * decay), rel=0.01)
+    assert rising_velocity(tight, path, 0.07) < 0.2 * rising_velocity(tight, path, 0.1048)
 
 
 @pytest.mark.parametrize("periodic", [True, False])
@@ -125,7 +127,7 @@ def test_rising_gas_is_all_the_gas_that_is_fed(case: Case, periodic: bool) -> No
     changed = case.with_({"geometry.periodic": periodic, "geometry.layer.plenum.height": "0.5 mm"})
     n = 4000
     points = [(i + 0.5) * 0.1397 / n for i in range(n)]
-    flow = sum(eng.rising_velocity(changed, x) for x in points) * 0.1397 / n
+    flow = sum(rising_velocity(changed.geometry, changed.gas.mean_free_path, x) for x in points) * 0.1397 / n
     assert flow == pytest.approx(2 * 0.035 * 4e-3, rel=1e-5)
 
 

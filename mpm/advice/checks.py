@@ -24,6 +24,7 @@ from mpm.case.keys import values
 from mpm.case.layers import Layer
 from mpm.case.materials import Material
 from mpm.case.ports import Inlet
+from mpm.case.throughflow import fastest_rise, rising_velocity, spreading_length
 from mpm.mesh.grid import Grid
 from mpm.motion.kinematics import Vibration
 from mpm.motion.schedule import Schedule
@@ -176,7 +177,7 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     diffusivity = effective_diffusivity(
         molecular, material.porosity, material.tortuosity_factor[1], case.porous.diffusion
     )
-    velocity = eng.rising_velocity(case, inlet.center)
+    velocity = rising_velocity(case.geometry, gas.mean_free_path, inlet.center)
     surface = material.surface_to_volume
     numbers["species"] = species
     if k == 0.0 and not mechanism.is_first_order:
@@ -201,14 +202,12 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
 
 def _bed(case: Case, layer: Layer) -> dict[str, Any]:
     gas, material, geometry = case.gas, layer.solid, case.geometry
-    rising = max(
-        (eng.rising_velocity(case, i.center) for i in geometry.inlets if i.side == "bottom"), default=0.0
-    )
+    rising = fastest_rise(geometry, gas.mean_free_path)
     permeability = material.slip_permeability(gas.mean_free_path)[1]
     numbers: dict[str, Any] = {
         "height": layer.height,
         "gas_velocity": rising,
-        "spreading_length": eng.spreading_length(case),
+        "spreading_length": spreading_length(geometry, gas.mean_free_path),
         "pressure_drop": gas.viscosity * rising * layer.height / permeability,
     }
     if case.motion.mean_velocity != 0.0:

@@ -86,57 +86,6 @@ def knudsen(free_path: float, diameter: float) -> float:
     return free_path / diameter
 
 
-def flow_resistance(case: Case) -> float:
-    """Sum of h/k_y over the porous layers [1/m]: pressure drop over viscosity and superficial velocity (Darcy)."""
-    path = case.gas.mean_free_path
-    return sum(
-        layer.height / layer.material.slip_permeability(path)[1]
-        for layer in case.geometry.layers
-        if layer.material
-    )
-
-
-def spreading_length(case: Case) -> float:
-    """Distance lambda = sqrt(H^3 R / 12) [m] over which gas spreads in the plenum before it enters the porous layers.
-
-    Slot flow under a resistance: q = -(H^3/12 mu) dp/dx in the gas layers below (height H together) and
-    u = p/(mu R) through the porous ones give lambda^2 u'' = u - source. Far above the zone length, as in the
-    thesis' reactor (3.7 m), the gas rises evenly along the strip whatever the place of the ports.
-    """
-    height = 0.0
-    for layer in case.geometry.layers:
-        if layer.material is not None:
-            return math.sqrt(height**3 * flow_resistance(case) / 12.0)
-        height += layer.height
-    return math.inf
-
-
-def rising_velocity(case: Case, x: float) -> float:
-    """Estimated superficial velocity [m/s] at which gas enters the porous layers at position `x`.
-
-    Sum over the bottom inlets of the response to a line source with decay length `spreading_length`, in a periodic
-    or a closed strip; at most the fastest port velocity.
-    """
-    length, decay = case.geometry.length, spreading_length(case)
-    inlets = [inlet for inlet in case.geometry.inlets if inlet.side == "bottom"]
-    fastest = max((inlet.velocity for inlet in inlets), default=0.0)
-    total = sum(inlet.velocity * inlet.width for inlet in inlets)
-    if decay == 0.0:
-        return fastest
-    if decay > 1e3 * length:
-        return min(fastest, total / length)
-    velocity = 0.0
-    for inlet in inlets:
-        distance = abs(x - inlet.center)
-        images, period = [distance, length - distance], length
-        if not case.geometry.periodic:  # the walls mirror the inlet
-            images = [distance, 2 * length - distance, x + inlet.center, 2 * length - x - inlet.center]
-            period = 2 * length
-        shape = sum(math.exp(-image / decay) for image in images) / -math.expm1(-period / decay)
-        velocity += inlet.velocity * inlet.width * shape / (2.0 * decay)
-    return min(fastest, velocity)
-
-
 def courant(*, velocity: float, step: float, size: float) -> float:
     """u dt / dx: cells passed in a step; the flow treats convection explicitly and wants it below 1."""
     return abs(velocity) * step / size

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from mpm.advice import engineering as eng
+from mpm.case.throughflow import rising_velocity
 from mpm.physics.gases import ideal_gas_density
 from mpm.physics.porous import particle_surface
 from mpm.physics.thermal import (
@@ -153,7 +154,8 @@ def _bed(case: Case, layer: Layer, of: dict[str, Any]) -> dict[str, Any]:
 def _exchange(case: Case, material: Material, diameter: float) -> tuple[float, float]:
     """Nu of the particles in the rising gas, and the time [s] in which they take its temperature through their outer surface."""
     gas = case.gas
-    rising = max((eng.rising_velocity(case, i.center) for i in case.geometry.inlets), default=0.0)
+    centres = [inlet.center for inlet in case.geometry.inlets]
+    rising = max((rising_velocity(case.geometry, gas.mean_free_path, x) for x in centres), default=0.0)
     nusselt = nusselt_of_particles(
         gas.viscosity * gas.heat_capacity / gas.conductivity,
         eng.reynolds(density=gas.density, velocity=rising, length=diameter, viscosity=gas.viscosity),

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from mpm.case.chemistry import HEATS
 from mpm.case.materials import BUILT_IN, Material
+from mpm.case.motion import FORCES
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.chemistry import SolidTable, SpeciesTable
+    from mpm.case.motion import Motion
 
 _CYCLE = ("frequency", "angle", "angle_from", "liftoff_velocity", "liftoff_phase", "contact_phase")
 """Keys of [motion] that shape the cycle, not its mean."""
@@ -57,7 +59,8 @@ def _says(model: Any, key: str) -> bool:
 def _of_motion(case: Case) -> Idle:
     motion, dispersed = case.motion, case.transport.vibrational_dispersion
     if motion.gamma == 0.0:
-        cycle = _CYCLE[1:] if case.fidelity == "resolved" else _CYCLE  # whose steps are parts of a cycle
+        still = (*_CYCLE, *FORCES)
+        cycle = still[1:] if case.fidelity == "resolved" else still  # whose steps are parts of a cycle
         yield from _typed(motion, "motion", cycle, "nothing vibrates (gamma = 0)")
         yield from _typed(
             case.transport,
@@ -67,6 +70,8 @@ def _of_motion(case: Case) -> Idle:
         )
         phases = ["phases"] if case.output.phases else []
         yield from _typed(case.output, "output", phases, "nothing vibrates (gamma = 0)")
+    elif motion.balances:
+        yield from _typed(motion, "motion", ["liftoff_velocity"], "motion.profile is not thesis")
     elif not case.follows_cycle:
         cycle = (*_CYCLE, "inlet_frame", *(() if motion.table is not None else ("gamma", "profile")))
         why = f"a run with fidelity {case.fidelity} sees the bed's mean velocity, not the cycle (vibrational_dispersion would)"
@@ -82,6 +87,21 @@ def _of_motion(case: Case) -> Idle:
     if case.geometry.moving_layer is None:
         yield from _typed(motion, "motion", ["bed_velocity"], "no layer moves")
         yield from _typed(case.geometry, "geometry", ["bed_inflow"], "no layer moves")
+    yield from _of_forces(motion)
+
+
+def _of_forces(motion: Motion) -> Idle:
+    """Keys of the forces on a bed that moves otherwise, and those that forces leave nothing to say."""
+    if not motion.balances:
+        yield from _typed(motion, "motion", FORCES, "motion.profile is not force_balance")
+        return
+    yield from _typed(
+        motion, "motion", ["bed_velocity"], "forces decide how fast the bed moves (motion.profile)"
+    )
+    if motion.through_velocity is not None:
+        yield from _typed(
+            motion, "motion", ["through_flow"], "motion.through_velocity says how much gas rises"
+        )
 
 
 def _of_time(case: Case) -> Idle:

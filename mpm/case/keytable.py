@@ -11,6 +11,7 @@ from typing import Any, get_origin
 from pydantic import BaseModel
 
 from mpm.case.materials import BUILT_IN
+from mpm.case.motion import FORCES
 from mpm.case.places import bare, tables_in
 from mpm.case.schema import finished, number_text
 from mpm.case.sources import built_in_files
@@ -26,14 +27,15 @@ ENTRIES = {
 """What the entries of a table of numbers are named after."""
 
 _CYCLE = "resolved; averaged and steady only with transport.vibrational_dispersion"
+_FORCED = f"{_CYCLE} or with motion.profile force_balance"
 _TIMED = "resolved, averaged"
 READ_BY = {
     **dict.fromkeys(
-        (f"motion.{key}" for key in ("frequency", "angle", "angle_from", "liftoff_velocity", "inlet_frame")),
-        _CYCLE,
+        (f"motion.{key}" for key in ("frequency", "angle", "angle_from", "inlet_frame")), _FORCED
     ),
-    "motion.gamma": f"{_CYCLE} (0 is read by all)",
-    "motion.profile": f"{_CYCLE} (the mean of a file is read by all)",
+    "motion.liftoff_velocity": _CYCLE,
+    "motion.gamma": f"{_FORCED} (0 is read by all)",
+    "motion.profile": f"{_CYCLE} (the mean of a file or of forces is read by all)",
     "motion.liftoff_phase": _CYCLE,
     "motion.contact_phase": _CYCLE,
     "motion.startup": "resolved",
@@ -54,6 +56,7 @@ _PARTICLES = ("porosity", "particle_diameter", "sphericity")
 _TOGETHER = (
     ("motion.gamma", "motion.frequency", "motion.angle", "motion.angle_from", "motion.bed_velocity", "motion.profile"),
     ("motion.profile", "motion.liftoff_velocity", "motion.liftoff_phase", "motion.contact_phase", "motion.bed_velocity"),
+    ("motion.profile", *(f"motion.{key}" for key in FORCES), "material.<name>.density", "material.<name>.permeability"),
     ("motion.bed_velocity", "geometry.layer.<name>.moving", "geometry.bed_inflow"),
     tuple(f"material.<name>.{key}" for key in ("permeability", *_PARTICLES, "kozeny_constant")),
     tuple(f"material.<name>.{key}" for key in ("surface_to_volume", *_PARTICLES)),

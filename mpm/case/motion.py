@@ -14,17 +14,32 @@ from pydantic import Field, PrivateAttr, SerializerFunctionWrapHandler, model_se
 from mpm.case.model import Frozen
 from mpm.case.profile import PRESETS, BedProfile, read_profile
 from mpm.constants import GRAVITY, TURN
-from mpm.units import Angle, BedSpeed, Frequency, Instant, NonNegative, Velocity, reject
+from mpm.physics.bed_cycle import BedCycle
+from mpm.units import (
+    Adhesion,
+    Angle,
+    BedSpeed,
+    Frequency,
+    Instant,
+    NonNegative,
+    Positive,
+    Velocity,
+    reject,
+    worked_out,
+)
 
 SAME_FREQUENCY = 0.01
 """Relative difference up to which a profile belongs to a vibration: a DEM's waveform may be fitted to a record of the same machine."""
+FORCES = ("friction", "adhesion", "gas_column", "through_flow", "through_velocity")
+"""Keys that the profile force_balance alone reads."""
 
 
 class Motion(Frozen):
     """Vibration of the reactor and conveying of the bed."""
 
     gamma: NonNegative = 0.30
-    """largest vertical acceleration of the reactor over g; 0: no vibration, the bed moves steadily at bed_velocity"""
+    """largest vertical acceleration of the reactor over g; 0: no vibration, the bed moves steadily at bed_velocity (profile force_balance:
+    it rests)"""
     frequency: Frequency = 16.0
     """frequency of the vibration"""
     angle: Angle = math.pi / 3.0
@@ -32,16 +47,29 @@ class Motion(Frozen):
     angle_from: Literal["horizontal", "vertical"] = "horizontal"
     """what the angle is counted from"""
     bed_velocity: BedSpeed = 0.013
-    """mean speed at which the bed is conveyed, relative to the reactor, to the right; 0: it stays. A profile file brings its own"""
+    """mean speed at which the bed is conveyed, relative to the reactor, to the right; 0: it stays. A profile file and force_balance bring
+    their own"""
     profile: Annotated[str, Field(json_schema_extra={"presets": [*PRESETS]})] = "thesis"
-    """how the bed moves within a cycle: thesis (lift-off at liftoff_velocity), phases (liftoff_phase and contact_phase), or the path
-    of a CSV file from `mpm dem`"""
+    """how the bed moves within a cycle: thesis (lift-off at liftoff_velocity), phases (liftoff_phase and contact_phase), force_balance
+    (as weight, gas and friction make it: mean velocity and phases follow), or the path of a CSV file from `mpm dem`"""
     liftoff_velocity: Velocity = -0.004
     """vertical velocity of the reactor at which the bed lifts off (profile thesis)"""
     liftoff_phase: Angle | None = None
     """phase of the cycle at which the bed lifts off, 0 deg to below 360 deg (profile phases)"""
     contact_phase: Angle | None = None
     """phase of the cycle at which the bed lands again, 0 deg to below 360 deg (profile phases)"""
+    friction: Positive = 0.4
+    """coefficient of friction between the bed and what it lies on (profile force_balance)"""
+    adhesion: Adhesion = 0.0
+    """stress with which the bed adheres to what it lies on, on top of its weight (profile force_balance)"""
+    gas_column: Literal["reactor", "lab"] = "reactor"
+    """what the gas below the bed moves with (profile force_balance): the reactor, whose floor is closed between the ports, or the
+    laboratory, as under an open floor, where a bed that rises draws gas in"""
+    through_flow: Literal["total", "local"] = "total"
+    """gas that carries part of the bed (profile force_balance). total: inflow below the bed over the strip's area; local: the most that
+    rises above a port, by the estimate of `mpm check`"""
+    through_velocity: Velocity | None = worked_out("through_flow, from the ports", None, example="0.2 cm/s")
+    """superficial velocity of the gas that rises through the bed, in place of through_flow (profile force_balance)"""
     drag_reference: Literal["pore", "superficial"] = "pore"
     """velocity of the superficial gas at which a moving bed does not drag on it. pore: eps times the bed's; superficial: the bed's"""
     inlet_frame: Literal["reactor", "lab"] = "reactor"
@@ -52,6 +80,31 @@ class Motion(Frozen):
     """how a resolved run begins to vibrate: in the periodic state of the gas, or from rest with the true transient"""
 
     _file: BedProfile | None = PrivateAttr(None)
+    _balance: BedCycle | None = PrivateAttr(None)
+
+    @property
+    def balances(self) -> bool:
+        """Whether the bed moves as its forces make it."""
+        return self.profile == "force_balance"
+
+    @property
+    def balance(self) -> BedCycle | None:
+        """The cycle that its forces make the bed repeat, which its case works out; None without vibration, or with another profile."""
+        if self.balances and self.gamma > 0.0 and self._balance is None:
+            raise ValueError("motion: the forces on a bed are those of a case")
+        return self._balance
+
+    def complete(self, balance: BedCycle) -> None:
+        """Take the motion that the case has worked out."""
+        self._balance = balance
+
+    @property
+    def amplitudes(self) -> tuple[float, float, float]:
+        """A_x, A_y [m] and w [1/s] of the displacement: A_y = Gamma g/w^2, the angle counted from the horizontal or the vertical."""
+        omega = TURN * self.frequency
+        ay = self.gamma * GRAVITY / omega**2
+        slope = math.tan(self.angle)
+        return ay / slope if self.angle_from == "horizontal" else ay * slope, ay, omega
 
     @property
     def table(self) -> BedProfile | None:
@@ -72,7 +125,12 @@ class Motion(Frozen):
 
     @property
     def mean_velocity(self) -> float:
-        """Cycle mean of the bed's velocity in the reactor's frame [m/s], negative to the left: the profile file's, else `bed_velocity`."""
+        """Cycle mean of the bed's velocity in the reactor's frame [m/s], negative to the left.
+
+        It is that of the profile file or of the forces, else `bed_velocity`.
+        """
+        if self.balances:
+            return 0.0 if self.balance is None else self.balance.mean
         return self.bed_velocity if self.table is None else self.table.mean
 
     @property
@@ -92,8 +150,8 @@ class Motion(Frozen):
             )
         if self.profile not in PRESETS:
             self._file = self._read_file()
-        elif self.gamma == 0.0:
-            pass  # nothing hops: a preset has no phases to check
+        elif self.gamma == 0.0 or self.balances:
+            pass  # no phases to check
         elif self.profile == "thesis":
             peak = self.peak_vertical_velocity
             if not -peak < self.liftoff_velocity < 0.0:
@@ -134,8 +192,10 @@ class Motion(Frozen):
 
     @model_serializer(mode="wrap")
     def _write_what_rules(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Without `bed_velocity` where a profile file says how fast the bed moves."""
+        """Without `bed_velocity` where a profile file or forces say how fast the bed moves, without what makes forces where none do."""
         table: dict[str, Any] = handler(self)
-        if self.table is not None:
+        if self.table is not None or self.balances:
             table.pop("bed_velocity", None)
+        for key in () if self.balances else FORCES:
+            table.pop(key, None)
         return table

@@ -28,7 +28,7 @@ from mpm.constants import TURN
 from mpm.files import read_text
 from mpm.units import Angle, Frequency, NonNegative, reject
 
-PRESETS = ("thesis", "phases")
+PRESETS = ("thesis", "phases", "force_balance")
 """What `motion.profile` may be besides the path of a file."""
 REQUIRED = ("phase_deg", "u_x_m/s")
 COLUMNS = (*REQUIRED, "u_y_m/s", "contact")

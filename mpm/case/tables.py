@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from mpm.case.balance import complete_motion
 from mpm.case.chemistry import Chemistry
 from mpm.case.energy import Energy, check_heats, check_layers, without_energy
 from mpm.case.gas import Gas
@@ -63,6 +64,7 @@ class CaseTables(Frozen):
         check_rates(self._mechanism, self.gas.temperature)
         self.gas.complete(self._mechanism)
         self._complete_energy()
+        complete_motion(self.motion, self.geometry, self.gas)
         self._check_cycle()
         return self
 
