@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 
 from mpm.constants import GRAVITY, TURN
-from mpm.physics.bed_balance import BedForces, Carried
 from mpm.physics.bed_cycle import BedCycle, NoCycle, bed_cycle, mean_speed
+from mpm.physics.bed_forces import BedForces, Carried
 
 PORTS = 2 * 0.035 * 4e-3 / 0.1397
 """Through-flow of the base zone: both ports over the strip [m/s]."""

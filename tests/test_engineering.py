@@ -174,7 +174,7 @@ def test_expected_steps(case: Case) -> None:
     ],
 )
 def test_what_is_questionable_is_said(case: Case, change: dict[str, object], text: str) -> None:
-    (warning,) = check_case(case.with_(change))["warnings"]
+    (warning,) = [w for w in check_case(case.with_(change))["warnings"] if "the flight of" not in w]
     assert text in warning
 
 

@@ -2,19 +2,27 @@
 
 import math
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from mpm.advice.checks import check_case
+from mpm.advice.doses import doses_of
 from mpm.advice.idle import idle_keys
 from mpm.case.balance import forces_on_bed, through_flow
 from mpm.case.case import Case, load_case
 from mpm.case.motion import Motion
+from mpm.cli import main
 from mpm.errors import InputError
 from mpm.motion.kinematics import BedMotion, step_motion
+from mpm.optimise import Search
+from mpm.reactor.reactor import Reactor
 from mpm.report.dosing import excess_numbers
+from mpm.report.trees import flatten
+from mpm.sweep.plan import plan
+from mpm.sweep.sweepfile import read_sweep
 
 from .cases import TINY, run, zone
 
@@ -167,3 +175,78 @@ def test_most_that_rises_above_a_port_carries_more() -> None:
     flow = through_flow(narrow.motion, narrow.geometry, narrow.gas)
     assert flow is not None
     assert flow.velocity == check_case(narrow)["bed"]["gas_velocity"] > 1.5 * PORTS
+
+
+def test_what_a_prescribed_flight_would_take() -> None:
+    """Fails when the preset's flight is not said to need -283 to +428 Pa on 39.7 Pa, or is where nothing is known or nothing flies so."""
+    resolved = load_case("single_zone", {"fidelity": "resolved"})
+    report = check_case(resolved)
+    (told,) = [w for w in report["warnings"] if "gas force" in w]
+    assert "-283 to 428 Pa" in told and "39.7 Pa" in told and "\n" not in told
+    motion, peak = report["motion"], 0.3 * 9.81 / (2 * math.pi * 16)
+    resistance = 1.72e-5 * 3e-3 / 4.25e-12
+    assert motion["flight_force_max"] == pytest.approx(resistance * (PORTS + peak + 0.004), rel=1e-9)
+    assert motion["flight_force_min"] == pytest.approx(resistance * (PORTS - peak + 0.004), rel=1e-9)
+    own = {"material.mine": OWN, "geometry.layer.bed.material": "mine"}
+    for quiet in (own, FORCES, {"fidelity": "averaged"}, {"motion.gamma": 0.0}):
+        found = check_case(resolved.with_(quiet))
+        assert not any("gas force" in w for w in found["warnings"]), quiet
+    assert "flight_force_max" in check_case(load_case("single_zone"))["motion"]
+    by_phases = {
+        "motion.profile": "phases",
+        "motion.liftoff_phase": "89 deg",
+        "motion.contact_phase": "91 deg",
+    }
+    assert not any("gas force" in w for w in check_case(resolved.with_(by_phases))["warnings"])
+
+
+def test_check_says_what_the_bed_does(capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when the report or the screen of `mpm check` lack phases, gap, forces, share of the gas or through-flow."""
+    case = base(gamma=0.45)
+    motion = check_case(case)["motion"]
+    kinds = [phase["kind"] for phase in motion["phases"]]
+    assert kinds == ["stick", "slide", "flight", "slide", "stick"]
+    assert math.degrees(motion["liftoff_phase"]) == pytest.approx(59.4443, abs=1e-4)
+    assert motion["gap"] == pytest.approx(1.4354e-6, rel=1e-4)
+    assert motion["contact_force_min"] == 0.0
+    assert motion["contact_force_max"] == pytest.approx(33.27, abs=5e-3)
+    assert set(motion["rising_velocity"]) == {"purge", "tma"}
+    assert (
+        main(["check", "single_zone", "--set", "motion.profile=force_balance", "--set", "motion.gamma=0.45"])
+        == 0
+    )
+    screen = capsys.readouterr().out.replace("\u00a0", " ")
+    for text in (
+        "1.492 cm/s",
+        "carries 61.2 % of its 39.7 Pa",
+        "from 59.44 to 153.9 deg",
+        "1.44 um",
+        "0 to 33.3 Pa",
+    ):
+        assert text in screen
+    assert "motion" not in flatten(Reactor(zone({"fidelity": "steady"}, TINY)).run().summary)
+
+
+def test_sweeps_and_searches_take_forces(tmp_path: Path) -> None:
+    """Fails when friction, gamma and angle are no axes, their cases do not differ in speed, or a search for doses does not take forces."""
+    (tmp_path / "s.toml").write_text(
+        '[sweep]\ncase = "single_zone"\n[sweep.set]\nfidelity = "steady"\n"motion.profile" = "force_balance"\n'
+        + "".join(
+            f'[[sweep.axis]]\nkey = "motion.{key}"\nvalues = {values}\n'
+            for key, values in (
+                ("friction", "[0.3, 0.4]"),
+                ("gamma", "[0.0, 0.3]"),
+                ("angle", '["30 deg", "60 deg"]'),
+            )
+        )
+    )
+    points = plan(read_sweep(tmp_path / "s.toml"))
+    speeds = [point.case.motion.mean_velocity for point in points if point.case is not None]
+    assert len(speeds) == 8 and speeds.count(0.0) == 4 and len(set(speeds)) == 5
+    case = base()
+    (fraction, velocity) = doses = doses_of(case, 0.9, velocities=True)
+    search = Search(case, doses, 0.9, 0.0)
+    values = {fraction.key: 3e-4, velocity.key: 0.05}
+    assert (
+        search.case_at(values).motion.mean_velocity > case.motion.mean_velocity
+    )  # more gas carries more of it

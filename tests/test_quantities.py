@@ -20,17 +20,20 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def results() -> dict[str, Result]:
-    """A zone and a cycle in time, the cycle's steady state with a second gas reaction, and a zone that cold powder enters."""
+    """A zone and a cycle in time, the cycle's steady state with a second gas reaction, cold powder that enters a zone by its own forces."""
     coarse = {**COARSE, "geometry.cell_width": "4 mm"}
     short = {**coarse, "time.end": "0.3 s", "time.step": "0.1 s"}
     second = {"equation": "TMA + 3 H2O -> 3 CH4 + Al(OH)3", "A": "1 cm^3/mol/s"}
+    forced = {"motion.profile": "force_balance", "motion.gamma": 0.45}
     cases = {
         "zone": load_case("single_zone", short),
         "cycle": load_case("single_cycle", short),
         "steady": load_case(
             "single_cycle", {**coarse, "fidelity": "steady", "chemistry.reaction.cvd2": second}
         ),
-        "warm": load_case("single_zone", {**short, "energy": {}, "geometry.bed_temperature": "25 degC"}),
+        "warm": load_case(
+            "single_zone", {**short, **forced, "energy": {}, "geometry.bed_temperature": "25 degC"}
+        ),
     }
     return {name: Reactor(case).run() for name, case in cases.items()}
 

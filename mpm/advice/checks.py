@@ -18,6 +18,7 @@ from mpm.advice.caveats import (
 from mpm.advice.heat import energy_report, heat_warnings
 from mpm.advice.idle import idle_keys
 from mpm.advice.limits import beyond_limits
+from mpm.advice.motion import flight_caveats, motion_report
 from mpm.advice.notes import notes
 from mpm.case.case import Case
 from mpm.case.keys import values
@@ -26,9 +27,7 @@ from mpm.case.materials import Material
 from mpm.case.ports import Inlet
 from mpm.case.throughflow import fastest_rise, rising_velocity, spreading_length
 from mpm.mesh.grid import Grid
-from mpm.motion.kinematics import Vibration
 from mpm.motion.schedule import Schedule
-from mpm.physics.conveying import perfect_flight_velocity, straight_drop_velocity
 from mpm.physics.fluidisation import (
     minimum_fluidisation_velocity,
     wen_yu_minimum_fluidisation,
@@ -78,7 +77,7 @@ def check_case(case: Case) -> dict[str, Any]:
             for layer in case.geometry.layers
             if layer.material
         },
-        "motion": _motion(case),
+        "motion": motion_report(case),
         "inlets": {inlet.name: _inlet(case, inlet) for inlet in case.geometry.inlets},
         "reactions": [str(r) for r in (*case.mechanism.surface_reactions, *case.mechanism.gas_reactions)],
     }
@@ -123,25 +122,6 @@ def _pores(case: Case, material: Material) -> dict[str, Any]:
             if (free := case.gas.diffusivity[s.name]) > 0.0
         }
     return numbers
-
-
-def _motion(case: Case) -> dict[str, float | str | None]:
-    vibration = Vibration.from_motion(case.motion)
-    return {
-        "gamma": case.motion.gamma,
-        "vibration_enters": case.follows_cycle and case.motion.gamma > 0.0,
-        "frequency": case.motion.frequency,
-        "amplitude_x": vibration.ax,
-        "amplitude_y": vibration.ay,
-        "peak_velocity_x": vibration.ax * vibration.omega,
-        "peak_velocity_y": vibration.ay * vibration.omega,
-        "straight_drop": straight_drop_velocity(vibration.ax, case.motion.frequency),
-        "perfect_flight": perfect_flight_velocity(vibration.ax, case.motion.frequency),
-        "bed_velocity": case.motion.mean_velocity,
-        "bed_velocity_from": "motion.bed_velocity"
-        if case.motion.table is None
-        else f"mean of {case.motion.profile}",
-    }
 
 
 def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
@@ -240,6 +220,7 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     """What is legal but questionable, one sentence each."""
     return [
         *profile_caveats(case),
+        *flight_caveats(case),
         *gas_caveats(case),
         *mass_caveats(case),
         *site_density_caveats(case),

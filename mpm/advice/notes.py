@@ -31,8 +31,9 @@ def _bed_notes(case: Case) -> list[str]:
         keys = " or ".join(f"geometry.layer.{name}.moving" for name in porous)
         return [f"no layer moves, so nothing is conveyed and no dose per site can be given ({keys} = true)"]
     if case.conveying_velocity == 0.0:
+        why = "its forces do not convey it" if case.motion.balances else "motion.bed_velocity is 0 cm/s"
         return [
-            f"layer {layer.name} does not move (motion.bed_velocity is 0 cm/s): no solids pass, so there is no dose per site and no "
+            f"layer {layer.name} does not move ({why}): no solids pass, so there is no dose per site and no "
             "time in the strip"
         ]
     return []

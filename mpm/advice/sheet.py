@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mpm.advice.heatsheet import heat_numbers, temperature_rows
+from mpm.advice.motion import force_rows
 from mpm.case.case import Case
 from mpm.case.marks import Marked, value_text
 from mpm.case.ports import Inlet
@@ -210,15 +211,15 @@ def _motion(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) ->
             sheet.add(f"{label} amplitude, peak velocity", f"{amplitude}, {peak}")
     if case.geometry.moving_layer is not None:
         speed = number(motion["bed_velocity"] * 1e2, "cm/s")
-        table = case.motion.table is not None
-        sheet.add(
-            "mean velocity of the bed",
-            f"{speed}, the mean of {Path(case.motion.profile).name}"
-            if table
-            else marked.text("motion.bed_velocity"),
-        )
-        if case.follows_cycle:
+        text = marked.text("motion.bed_velocity")
+        if case.motion.balances:
+            text = f"{speed}, from weight, gas and friction"
+        elif case.motion.table is not None:
+            text = f"{speed}, the mean of {Path(case.motion.profile).name}"
+        sheet.add("mean velocity of the bed", text)
+        if case.follows_cycle or case.motion.balances:
             sheet.add("profile of the bed's velocity", marked.text("motion.profile"))
+        force_rows(sheet, motion, marked)
         if case.motion.gamma > 0.0 and "perfect_flight" in motion:
             limits = f"{number(motion['straight_drop'] * 1e2)} and {number(motion['perfect_flight'] * 1e2, 'cm/s')}"
             sheet.add("straight drop and perfect flight", f"convey at {limits}")

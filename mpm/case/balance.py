@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mpm.case.throughflow import Throughflow, fastest_rise, total_throughflow
-from mpm.physics.bed_balance import BedForces, Carried
 from mpm.physics.bed_cycle import NoCycle, bed_cycle
+from mpm.physics.bed_forces import BedForces, Carried
 from mpm.units import reject
 
 if TYPE_CHECKING:

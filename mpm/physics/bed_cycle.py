@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from mpm.constants import TURN
-from mpm.physics.bed_balance import BedForces, Kind, Stretch, at_rest, successor
+from mpm.physics.bed_balance import Kind, Stretch, at_rest, successor
+from mpm.physics.bed_forces import BedForces
 
 CYCLES = 2000
 """Cycles within which a bed comes to repeat itself, or does not: friction wears a difference off in far fewer."""

@@ -12,6 +12,7 @@ from dataclasses import replace
 from functools import cache, lru_cache
 
 from mpm.report.balances import balance_errors, element_balances, site_balance, species_balances
+from mpm.report.bed_motion import BED_MOTION, bed_motion
 from mpm.report.coating import film, titration, utilisation
 from mpm.report.dosing import dose_ratios, excess_numbers
 from mpm.report.fronts import fronts
@@ -29,7 +30,8 @@ _DOSED = "What was dosed, what was used"
 _ASTRAY = "Parasitic growth and precursor astray"
 COST = "Time and cost"
 HEADINGS = (
-    "What leaves coated", _DOSED, _ASTRAY, "Film", "Temperature", "Heat", "Gas flow", "Gas in the outlets", "Fronts", COST
+    "What leaves coated", _DOSED, _ASTRAY, "Film", "Temperature", "Heat", "Motion of the bed", "Gas flow", "Gas in the outlets",
+    "Fronts", COST
 )  # fmt: skip
 """Of the sections, in the order in which people ask."""
 FIRST = ("titration", "utilisation", "dose_ratio", "cvd", "film", "temperature.bed_exit", "heating")
@@ -154,6 +156,7 @@ SECTIONS = (
         Quantity("energy.balance_error", "balance error of heat", RATIO,
             "inlets + outlets + walls + solids + reaction + heating - stored, over the largest of them", error=True),
     )),
+    Section("motion", "Motion of the bed", lambda r: bed_motion(r.case), BED_MOTION, history=False),
     Section("balance", "", lambda r: balance_errors(r.case, r.totals), (
         Quantity("balance.<species>", "balance error of {species}", RATIO,
             "residual over the largest of the terms; `sites`: of the surface sites; with `[energy]` also `energy` and `gas`", error=True),
