@@ -100,6 +100,7 @@ SCREENS: dict[str, list[str]] = {
     "check, no bed": ["check", "single_zone", "--set", "geometry.layer.bed.moving=false"],
     "check, steady": ["check", "single_zone", "--set", "fidelity=steady", "--set", "gas.pressure=1 torr"],
     "check, resolved": ["check", "single_zone", "--set", "fidelity=resolved", "--set", "motion.inlet_frame=lab"],
+    "check, closed code": ["check", "single_zone", "--set", "conventions=closed-code", "--set", "porous.inertia=interstitial"],
     "check, many ports": ["check", str(ROOT / "meshes" / "four_cycles.toml")],
     "check --full": ["check", "single_zone", "--full"],
     "mechanism": ["mechanism", "single_cycle"],
@@ -168,7 +169,7 @@ RATIOS = re.compile(
 )
 COUNTS = re.compile(
     r"\b(?:cells|columns|places|reactions|rows|facets|steps?|processes|points|phases|steps_per_cycle|ports|done|running|to run|at a time|"
-    r"states)\b"
+    r"backflow_rows|states)\b"
 )
 
 

@@ -15,6 +15,7 @@ from mpm.advice.caveats import (
     site_density_caveats,
     steady_caveats,
 )
+from mpm.advice.conventions import convention_caveats, convention_numbers
 from mpm.advice.heat import energy_report, heat_warnings
 from mpm.advice.idle import idle_keys
 from mpm.advice.limits import beyond_limits
@@ -44,6 +45,7 @@ def check_case(case: Case) -> dict[str, Any]:
     report: dict[str, Any] = {
         "title": case.title,
         "fidelity": case.fidelity,
+        "conventions": convention_numbers(case),
         "strip": _strip(case),
         "mesh": {
             "columns": grid.columns,
@@ -221,6 +223,7 @@ def warnings(case: Case, report: dict[str, Any]) -> list[str]:
     return [
         *profile_caveats(case),
         *flight_caveats(case),
+        *convention_caveats(case),
         *gas_caveats(case),
         *mass_caveats(case),
         *site_density_caveats(case),

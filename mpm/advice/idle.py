@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mpm.advice.conventions import idle_switches
 from mpm.case.chemistry import HEATS
 from mpm.case.materials import BUILT_IN, Material
 from mpm.case.motion import FORCES
@@ -32,6 +33,7 @@ def idle_keys(case: Case) -> list[str]:
         *_of_motion(case),
         *_of_time(case),
         *_of_ports(case),
+        *idle_switches(case),
         *_of_energy(case),
         *_of_solids(case),
         *_of_entropies(case),

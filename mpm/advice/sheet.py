@@ -26,6 +26,7 @@ def case_sheet(case: Case, report: dict[str, Any], marked: Marked) -> Sheet:
     _ports(sheet, case, report, marked)
     _motion(sheet, case, report, marked)
     temperature_rows(sheet, case, report, marked)
+    _conventions(sheet, report, marked)
     _engineering(sheet, report)
     _cost(sheet, case, report, marked)
     return sheet
@@ -225,6 +226,16 @@ def _motion(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) ->
             sheet.add("straight drop and perfect flight", f"convey at {limits}")
     if case.fidelity != "steady":
         sheet.add("motion starts at", marked.text("motion.start"))
+
+
+def _conventions(sheet: Sheet, report: dict[str, Any], marked: Marked) -> None:
+    """One row where all are this model's own, else what differs."""
+    sheet.group("Conventions")
+    found = report["conventions"]
+    own = "" if found["differing"] else ": all switches are this model's own"
+    sheet.add("preset", f"{found['preset']}{marked.mark('conventions')}{own}")
+    for key, words in found["differing"].items():
+        sheet.add(key, words + marked.mark(key), part=True)
 
 
 def _engineering(sheet: Sheet, report: dict[str, Any]) -> None:

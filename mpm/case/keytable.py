@@ -10,6 +10,7 @@ from typing import Any, get_origin
 
 from pydantic import BaseModel
 
+from mpm.case.conventions import SWITCHES
 from mpm.case.materials import BUILT_IN
 from mpm.case.motion import FORCES
 from mpm.case.places import bare, tables_in
@@ -72,6 +73,10 @@ _TOGETHER = (
     tuple(f"geometry.wall.<name>.{key}" for key in ("temperature", "heat_flux", "heat_transfer_coefficient", "ambient")),
     ("energy.conductivity_model", "gas.conductivity", *(f"material.<name>.{key}" for key in ("conductivity", "effective_conductivity"))),
     ("gas.mixture", "chemistry.species.<name>.viscosity", "chemistry.species.<name>.molar_mass", "gas.diffusivity"),
+    *(("conventions", switch) for switch in SWITCHES),
+    ("transport.scheme", "geometry.cell_width", "geometry.layer.<name>.cells"),
+    ("porous.diffusion", "material.<name>.tortuosity_factor", "material.<name>.porosity", "gas.diffusivity"),
+    ("motion.drag_reference", "porous.inertia", "motion.bed_velocity", "geometry.layer.<name>.moving"),
     ("gas.heat_capacity", "material.<name>.heat_capacity", "material.<name>.density"),
     ("material.<name>.pore_diameter", "material.<name>.permeability", "gas.pressure"),
     (*(f"chemistry.{k}.<name>.enthalpy" for k in ("species", "site", "film")), "chemistry.reaction.<name>.heat_of_reaction"),

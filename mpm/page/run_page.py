@@ -101,7 +101,7 @@ def run_page(
 
 
 TITLES = (
-    ("Model and time", ("title", "fidelity", "time.", "output.", "transport.")),
+    ("Model and time", ("title", "fidelity", "conventions", "time.", "output.", "transport.", "porous.")),
     ("Geometry", ("geometry.",)),
     ("Motion", ("motion.",)),
     ("Materials", ("material.",)),

@@ -19,9 +19,15 @@ def numbers(tree: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str,
             yield name, value
 
 
+CHOSEN = "conventions."
+"""Below it a summary says how its numbers were computed: a choice that is a number, such as `transport.backflow_rows`, is no result."""
+
+
 def flatten(tree: Mapping[str, object]) -> dict[str, float]:
-    """The finite ones of them."""
-    return {name: value for name, value in numbers(tree) if math.isfinite(value)}
+    """The finite ones of them that are results."""
+    return {
+        name: value for name, value in numbers(tree) if math.isfinite(value) and not name.startswith(CHOSEN)
+    }
 
 
 def nest(flat: Mapping[str, float]) -> dict[str, Any]:
