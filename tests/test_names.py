@@ -43,7 +43,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["check", "single_zone", "--set", "geometry.inlet.TMA.velocity=1 cm/s"], ["purge, tma", "did you mean tma?"]),
         (["check", "single_zone", "--set", "velocity=1 cm/s"], ["velocity belongs elsewhere: geometry.inlet.<name>.velocity"]),
         (["check", "single_zone", "--set", "motion.temperature=1 K"], ["temperature belongs elsewhere: ", ", gas.temperature"]),
-        (["sweep", "dsoe"], ["a built-in one: dose, gamma, heating, port_bed, tma_speed", "did you mean dose?"]),
+        (["sweep", "dsoe"], ["a built-in one: dose, force_balance, gamma, heating, port_bed, tma_speed", "did you mean dose?"]),
         (["dem", "gl56_ari"], ["a built-in one: demo, gl223_sawtooth, gl56_air", "did you mean gl56_air?"]),
         (["dem", "gl56_air", "--set", "powder=GL65"], ["GL50, GL29, GL56", "did you mean GL56?"]),
     ],
