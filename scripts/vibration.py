@@ -17,7 +17,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from document import write_between
-from vibration_sections import columns, dispersion, figure, readings, switches
+from vibration_sections import columns, dispersion, figure, force, readings, switches
 from vibration_sections.store import WIDTHS, Lab
 
 ROOT = Path(__file__).parents[1]
@@ -30,6 +30,7 @@ SECTIONS: dict[str, Callable[[Lab], str]] = {
     "added": dispersion.added,
     "columns": columns.table,
     "models": columns.models,
+    "force": force.table,
     "switches": switches.table,
 }
 
