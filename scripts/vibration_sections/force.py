@@ -22,7 +22,7 @@ def pressures(lab: Lab, gamma: float) -> dict[str, float]:
     bed = next(layer for layer in case.geometry.layers if layer.moving)
     material = bed.material
     course = BedMotion(case.motion).course
-    assert material is not None and isinstance(course, Flight)
+    assert material is not None and material.density is not None and isinstance(course, Flight)
     resistance = case.gas.viscosity * bed.height / material.permeability[1]
     through = sum(i.velocity * i.width for i in case.geometry.inlets) / case.geometry.length
     phase = course.liftoff + np.linspace(0.0, (course.contact - course.liftoff) % TURN, PHASES)
