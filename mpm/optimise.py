@@ -85,7 +85,11 @@ class Search:
 
     def _solve(self, values: tuple[float, ...]) -> Point | None:
         doses = {dose.key: value for dose, value in zip(self.doses, values, strict=True)}
-        case = self.case_at(doses)
+        try:
+            case = self.case_at(doses)
+        except InputError as error:  # such as a velocity whose gas would carry the bed away
+            log.warning("optimise: %s", error)
+            return None
         velocities = tuple(inlet.velocity for inlet in case.geometry.inlets)
         known = self._flow[1] if self._flow is not None and self._flow[0] == velocities else None
         if case.energy is not None:

@@ -250,3 +250,6 @@ def test_sweeps_and_searches_take_forces(tmp_path: Path) -> None:
     assert (
         search.case_at(values).motion.mean_velocity > case.motion.mean_velocity
     )  # more gas carries more of it
+    assert (
+        search.point(np.log([3e-4, 0.12])) is None
+    )  # and so much carries it away: not a dose, and no end of the search
