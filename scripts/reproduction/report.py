@@ -62,7 +62,8 @@ None of the criteria was changed for the second column. On 2026-11-26 the shear 
 ([CHANGELOG](../CHANGELOG.md)): gas at its surface now moves with the powder. Compared with the measurement before it, of 2026-11-23, that
 turned four verdicts of the model's own conventions. R14 holds since. In R17 the overshoot in zone 1 at 4.0 mm is gone, but that row was on
 the thesis' mesh before, so the mesh may have a part in it. In R20 the delay leaves a burst at 2.2 mm. In R8 the order by Gamma holds with
-inlets at rest in the lab. A stored run is named by its case, not by the program; a row records which revision made the runs it used.
+inlets at rest in the lab. R9, R10, R13 to R15 and R23 stood on the thesis' mesh in earlier editions and stand on the medium one in both columns here; no verdict
+among them moved with it. A stored run is named by its case, not by the program; a row records which revision made the runs it used.
 Explanations in the paragraphs for R14, R16 to R18 and R21 are interpretations that have not been tested on their own.
 
 """
