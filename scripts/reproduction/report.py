@@ -35,8 +35,9 @@ on. The base cases are [cases/thesis](../cases/thesis): 473 K, Gamma 0.30, 16 Hz
 Y_TMA = 1e-3 in one zone and 2e-4/7.5e-5 in the full cycle. *Box* is the bed from the left end of a zone to its
 precursor port's centreline. Lengths upstream of a port are positive.
 
-*mpm* are the model's own conventions; *closed code* those of the preset `conventions = "closed-code"` ([case_file.md](case_file.md)): what
-the solver that the thesis used does by default, as far as its equations and manual tell. Both are computed by this program.
+*mpm* are the model's own conventions; *closed code* those of the preset `conventions = "closed-code"`
+([conventions.md](conventions.md)): what the solver that the thesis used does by default, as far as its equations and manual tell. Both are
+computed by this program.
 
 What is assumed because the thesis does not print it, and where the model departs from its equations: [source.md](source.md).
 
@@ -62,8 +63,9 @@ None of the criteria was changed for the second column. On 2026-11-26 the shear 
 ([CHANGELOG](../CHANGELOG.md)): gas at its surface now moves with the powder. Compared with the measurement before it, of 2026-11-23, that
 turned four verdicts of the model's own conventions. R14 holds since. In R17 the overshoot in zone 1 at 4.0 mm is gone, but that row was on
 the thesis' mesh before, so the mesh may have a part in it. In R20 the delay leaves a burst at 2.2 mm. In R8 the order by Gamma holds with
-inlets at rest in the lab. R9, R10, R13 to R15 and R23 stood on the thesis' mesh in earlier editions and stand on the medium one in both columns here; no verdict
-among them moved with it. A stored run is named by its case, not by the program; a row records which revision made the runs it used.
+inlets at rest in the lab. R9, R10, R13 to R15 and R23 stood on the thesis' mesh in the edition before and stand on the medium one in both
+columns here; no verdict among them moved with it. A stored run is named by its case, not by the program; a row records which revision made
+the runs it used.
 Explanations in the paragraphs for R14, R16 to R18 and R21 are interpretations that have not been tested on their own.
 
 """
