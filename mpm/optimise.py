@@ -212,7 +212,11 @@ def make_directory(directory: Path) -> None:
                 directory, "", what_it_is(directory), "a new directory, or that of an earlier search (-o DIR)"
             )
         directory.mkdir(parents=True, exist_ok=True)
-        for name in ("case.toml", "points.csv"):  # of an earlier search, whose doses this one may not reach
+        for name in (
+            "case.toml",
+            "points.csv",
+            "over.csv",
+        ):  # of an earlier search, whose doses this one may not reach
             (directory / name).unlink(missing_ok=True)
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as error:

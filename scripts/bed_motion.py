@@ -174,8 +174,9 @@ experiments with them (4.4.1), since that of the simulations is not printed.
 
 {beside()}
 
-The measured speed of GL56 is that of a vibration at about 45 deg with the friction that the source has measured, not at its 60 deg, where
-the balance gives about half of it or less; the large beads say the same. With 60 deg it takes gas near fluidisation (below).
+At the 60 deg of the source the balance gives half of the measured speed of GL56 or less, with any friction that the source has measured;
+counted from the vertical, which is 30 deg, it gives more. In between, at 45 deg with friction 0.3 to 0.4, it gives the speed, which is one
+number met by eye and proves nothing. At 60 deg it takes gas near fluidisation (below).
 
 The source's wall friction is 0.29 to 0.52 (figure 3.8; 0.29 to 0.38 for GL223). The adhesion that it extrapolates from yield loci, 72 Pa
 for GL56 (figure 3.9), would be {72.0 / forces.weight:.1f} times the weight of 3 mm of bed: with `adhesion = "72 Pa"` the bed moves at

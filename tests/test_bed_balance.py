@@ -46,7 +46,7 @@ def kinds(cycle: BedCycle) -> list[str]:
 def test_figures_of_the_base_bed() -> None:
     """Fails when the flight at Gamma 0.45, the gaps or the weight are not those integrated without mpm.
 
-    Landing is 153.8854 deg here and by `solve_ivp` (below); the figure from elsewhere, 153.8867 deg, came by steps.
+    Landing is 153.8854 deg here and by `solve_ivp` (below); the figure handed down, 153.8867 deg, is 0.0013 deg off, why is not known.
     """
     cycle = bed_cycle(forces(0.45))
     ((liftoff, landing),) = cycle.flights

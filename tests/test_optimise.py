@@ -76,6 +76,56 @@ def test_both_zones_through_the_command_line(tmp_path: Path, capsys: pytest.Capt
     assert f"mpm run {tmp_path}/case.toml" in told and "umol/m/s" in told
 
 
+def test_what_another_key_does_to_the_doses(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when a search over another key does not give each value its own doses (in proportion to the speed of the bed, where all
+    precursor is consumed), loses a value that has none, or cannot be repeated in its directory."""
+    settings = [f"{key}={json.dumps(value)}" for key, value in TINY.items()]
+    settings += ["motion.profile=force_balance", "motion.angle=45 deg"]
+    arguments = [
+        "optimise",
+        str(CASES / "single_zone.toml"),
+        "-o",
+        str(tmp_path),
+        "--target",
+        "0.9",
+        "--limit",
+        "4",
+    ]
+    arguments += [part for setting in settings for part in ("--set", setting)]
+    for values in ("0.05,0.3", "0.05,0.3,0.45"):
+        assert main([*arguments, "--over", f"motion.gamma={values}"]) == 0, capsys.readouterr().err
+    with (tmp_path / "over.csv").open() as file:
+        resting, slow, fast = csv.DictReader(file)
+    assert float(resting["motion.bed_velocity"]) == 0.0
+    assert "a bed that does not move" in resting["reason"]
+    speeds, doses = (
+        [float(row[name]) for row in (slow, fast)]
+        for name in ("motion.bed_velocity", "geometry.inlet.tma.mass_fractions.TMA")
+    )
+    assert speeds[0] == pytest.approx(0.01343, rel=1e-3)
+    assert doses[1] / doses[0] == pytest.approx(speeds[1] / speeds[0], rel=1e-3)
+    best = load_case(tmp_path / "0.45" / "case.toml")
+    assert best.motion.gamma == 0.45
+    assert best.geometry.inlets[1].mass_fractions["TMA"] == pytest.approx(doses[1], rel=1e-12)
+    told = " ".join(capsys.readouterr().out.split())
+    assert "0.05: bed at 0 cm/s; no doses found" in told
+
+
+@pytest.mark.parametrize(
+    "over",
+    ["motion.gamma", "motion.gamma=", "=0.3", "motion.gamma=0.3,0.3", "motion.gama=0.3", "motion.gamma=fast"],
+)
+def test_a_search_over_nonsense_is_one_line(
+    over: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when a list of values that is none, or a value that no case has, is more than one line, or leaves a directory."""
+    assert (
+        main(["optimise", str(CASES / "single_zone.toml"), "-o", str(tmp_path / "new"), "--over", over]) == 2
+    )
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_coverage_a_little_below_the_target_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> None:
     """Fails when a coverage below the target counts as reaching it and nothing says why."""
     search = Search(zone(mesh=TINY), doses_of(zone(mesh=TINY), 0.99, False), 0.99, 10.0)

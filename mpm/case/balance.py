@@ -41,15 +41,18 @@ def forces_on_bed(motion: Motion, geometry: Geometry, gas: Gas) -> BedForces | N
 
 
 def through_flow(motion: Motion, geometry: Geometry, gas: Gas) -> Throughflow | None:
-    """Gas through the bed, and how much of the reactor's vertical velocity it lags behind; None where the ports do not tell."""
-    ports = total_throughflow(geometry, gas)
-    velocity = motion.through_velocity
+    """Gas through the bed, and how much of the reactor's vertical velocity it lags behind; None where the ports do not tell.
+
+    Beside a prescribed motion, of which forces are only told, it is what the ports send: the keys that say otherwise are without effect.
+    """
+    ports, decides = total_throughflow(geometry, gas), motion.balances
+    velocity = motion.through_velocity if decides else None
     if velocity is None and ports is not None:
-        local = motion.through_flow == "local" and ports.velocity > 0.0
+        local = decides and motion.through_flow == "local" and ports.velocity > 0.0
         velocity = fastest_rise(geometry, gas.mean_free_path) if local else ports.velocity
     if velocity is None:
         return None
-    if motion.gas_column == "lab":
+    if decides and motion.gas_column == "lab":
         return Throughflow(velocity, 1.0)
     moves = motion.inlet_frame == "lab" and ports is not None
     return Throughflow(velocity, ports.lag if moves and ports is not None else 0.0)

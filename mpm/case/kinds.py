@@ -50,7 +50,8 @@ _BY_ENDING = {
     ".vtu": Kind("fields", "ParaView opens them"),
     ".py": Kind("a Python program", "python {path} runs it"),
 }  # fmt: skip
-_CASE_KEYS = {"geometry", "fidelity", "material", "gas", "chemistry", "motion", "time", "output", "transport", "energy"}  # fmt: skip
+_CASE_KEYS = {"geometry", "fidelity", "material", "gas", "chemistry", "motion", "time", "output", "transport", "porous",
+    "energy"}  # fmt: skip
 
 
 def kind_of_tables(data: Mapping[str, Any]) -> Kind | None:
@@ -71,7 +72,8 @@ def kind_of_directory(path: Path) -> Kind | None:
     """What a directory holds; None for one that mpm has not written."""
     if any((path / name).exists() for name in ("sweep.json", "driver")):
         return SWEEP_RUN
-    if (path / "points.csv").exists() and not (path / "run.log").exists():
+    searched = (path / "points.csv").exists() or (path / "over.csv").exists()
+    if searched and not (path / "run.log").exists():
         return SEARCH
     if not (path / "case.toml").is_file():
         return None

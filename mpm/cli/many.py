@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,12 @@ from mpm.case.settings import parse_settings
 from mpm.cli.base import CaseArgument, SetOption, app
 from mpm.launcher import rank
 from mpm.screen import screen
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mpm.case.case import Case
+    from mpm.optimise import Search
 
 
 @app.command()
@@ -57,15 +63,21 @@ def optimise(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", metavar="DIR", help="default: results/optimise/CASE")
     ] = None,
+    over: Annotated[
+        str | None,
+        typer.Option(metavar="KEY=VALUES", help="search at each value of a key, e.g. motion.gamma=0.3,0.6"),
+    ] = None,
     settings: SetOption = None,
 ) -> None:
     """Find the doses that titrate the solids with the least precursor and CVD.
 
     mpm optimise single_cycle
     mpm optimise single_cycle --target 0.95 --velocities -o results/lean
+    mpm optimise single_zone --set motion.profile=force_balance --over motion.friction=0.3,0.4,0.5
 
     The start are the mass fractions that would be just enough if nothing were lost; every further step is a steady state. DIR gets the
-    case with the best doses (case.toml), all steady states (points.csv) and a picture of the search (plots/search.png).
+    case with the best doses (case.toml), all steady states (points.csv) and a picture of the search (plots/search.png). With --over a
+    search at each of the values, in directories of their own, and their best doses side by side (over.csv).
     """
     from mpm.case.case import load_case
 
@@ -73,28 +85,44 @@ def optimise(
     directory = output or Path("results") / "optimise" / Path(case).stem
 
     from mpm.advice.doses import checked_doses
-    from mpm.optimise import Search, make_directory, write_points
+    from mpm.cli.searchover import search_over, variants
+    from mpm.optimise import Search, make_directory
     from mpm.parallel import on_root
 
     from mpi4py import MPI  # isort: skip  (after mpm.optimise, which loads the finite-element stack)
 
-    doses = checked_doses(loaded, target, weight, velocities, limit)  # bad input leaves nothing behind
+    console = screen() if rank() == 0 else None
+
+    def search(at: Case, folder: Path) -> Search:
+        doses = checked_doses(at, target, weight, velocities, limit)  # bad input leaves nothing behind
+        on_root(MPI.COMM_WORLD, lambda: make_directory(folder))
+        return _searched(Search(at, doses, target, weight), folder, limit, console)
+
+    if over is None:
+        search(loaded, directory)
+        return
+    key, cases = variants(loaded, over)
     on_root(MPI.COMM_WORLD, lambda: make_directory(directory))
-    search, console = Search(loaded, doses, target, weight), screen()
-    if rank() != 0:
+    search_over(key, cases, directory, search, console)
+
+
+def _searched(search: Search, directory: Path, limit: int, console: Console | None) -> Search:
+    """The search, run; what it has seen is written and told on the rank with a `console`, also where it is stopped or finds nothing."""
+    if console is None:
         search.run(limit)
         search.found()
-        return
+        return search
     from mpm.cli.searchscreen import draw_search, print_found, print_point, print_task
+    from mpm.files import write_atomically
+    from mpm.optimise import write_points
 
     print_task(search, limit, console)
     try:
         search.run(limit, lambda point: print_point(search, point, console))
-    finally:  # a search that is stopped, or finds nothing, leaves what it has seen
+    finally:
         if search.points:
             write_points(directory, search)
             draw_search(directory, search)
-    from mpm.files import write_atomically
-
     write_atomically(directory / "case.toml", search.best_case().to_toml())
     print_found(search, directory, console)
+    return search

@@ -1,0 +1,124 @@
+"""`mpm optimise --over KEY=VALUE,VALUE,...`: the best doses at each value of another key, as of Gamma or friction."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mpm.case.settings import parse_settings
+from mpm.errors import ConvergenceError, InputError
+from mpm.files import write_atomically
+from mpm.screen import number, say
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mpm.case.case import Case
+    from mpm.optimise import Search
+
+EXAMPLE = "motion.gamma=0.3,0.45,0.6"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variant:
+    """The case at one value of the key: `text` as it was typed, which names its directory too."""
+
+    text: str
+    case: Case
+
+
+def variants(case: Case, over: str) -> tuple[str, list[Variant]]:
+    """The key, and the case at each value. Raises InputError for what is no such list, and where a case is refused."""
+    key, equals, values = over.partition("=")
+    texts = [text.strip() for text in values.split(",")]
+    if not equals or not key.strip() or not all(texts) or len(set(texts)) < len(texts):
+        raise InputError.at("--over", "", repr(over), f"KEY=VALUE,VALUE,..., e.g. {EXAMPLE}", given="")
+    found = []
+    for text in texts:
+        settings: dict[str, Any] = parse_settings([f"{key}={text}"])
+        found.append(Variant(text=text, case=case.with_(settings)))
+    return key.strip(), found
+
+
+def folder_of(directory: Path, text: str) -> Path:
+    """Where the search at a value goes: its text without what a path would not take."""
+    return directory / "".join(c if c.isalnum() or c in "._+-" else "_" for c in text)
+
+
+def search_over(
+    key: str,
+    cases: list[Variant],
+    directory: Path,
+    search: Callable[[Case, Path], Search],
+    console: Console | None,
+) -> None:
+    """Search at each value; `over.csv` grows by a row after each, `console` (on one rank) is told.
+
+    A value at which no dose can be chosen, or none reaches the target, has its reason in place of numbers. Raises ConvergenceError where
+    that is so of all.
+    """
+    rows: list[dict[str, Any]] = []
+    for variant in cases:
+        row: dict[str, Any] = {key: variant.text, "motion.bed_velocity": variant.case.conveying_velocity}
+        if console is not None:
+            console.print()
+            say(console, f"{key} = {variant.text}: bed at {_speed(row)}")
+        try:
+            row |= _numbers(search(variant.case, folder_of(directory, variant.text)))
+        except (InputError, ConvergenceError) as error:
+            row["reason"] = str(error)
+            if console is not None:
+                say(console, str(error), 2)
+        rows.append(row)
+        if console is not None:
+            write_atomically(directory / "over.csv", _table(rows))
+    if console is not None:
+        print_over(key, rows, directory, console)
+    if all("reason" in row for row in rows):
+        raise ConvergenceError(f"optimise: no value of {key} has doses that reach the target")
+
+
+def _numbers(search: Search) -> dict[str, Any]:
+    best = search.found()
+    numbers: dict[str, Any] = dict(best.doses)
+    for inlet, value in best.exits.items():
+        numbers[f"titration.{inlet}.exit_mean"] = value
+        numbers[f"excess_number.{inlet}"] = best.excess[inlet]
+    return {**numbers, "fed": best.fed, "cvd.total": best.cvd}
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    names = dict.fromkeys(name for row in rows for name in row)
+    text = io.StringIO()
+    table = csv.DictWriter(text, list(names), lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue()
+
+
+def print_over(key: str, rows: list[dict[str, Any]], directory: Path, console: Console) -> None:
+    """The best doses side by side."""
+    console.print()
+    say(console, f"Best doses over {key}:")
+    for row in rows:
+        if "reason" in row:
+            said = "no doses found"
+        else:
+            inlets = [name.split(".")[1] for name in row if name.startswith("excess_number.")]
+            doses = [
+                f"{name.split('.')[2]} {value:.4g}"
+                for name, value in row.items()
+                if ".mass_fractions." in name
+            ]
+            used = ", ".join(f"{row[f'excess_number.{inlet}']:.4g} of {inlet}" for inlet in inlets)
+            said = f"mass fraction {', '.join(doses)}; molecules per site {used}"
+        say(console, f"{row[key]}: bed at {_speed(row)}; {said}", 2)
+    say(console, f"Results: {directory}: over.csv, and a directory per value")
+
+
+def _speed(row: dict[str, Any]) -> str:
+    return number(1e2 * row["motion.bed_velocity"], "cm/s")
