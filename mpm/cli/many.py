@@ -73,7 +73,7 @@ def optimise(
 
     mpm optimise single_cycle
     mpm optimise single_cycle --target 0.95 --velocities -o results/lean
-    mpm optimise single_zone --set motion.profile=force_balance --over motion.friction=0.3,0.4,0.5
+    mpm optimise single_zone --over 'gas.pressure=626 torr,1 bar'
 
     The start are the mass fractions that would be just enough if nothing were lost; every further step is a steady state. DIR gets the
     case with the best doses (case.toml), all steady states (points.csv) and a picture of the search (plots/search.png). With --over a
