@@ -4,6 +4,7 @@
     python scripts/reproduce.py R9 R10                      # some rows
     python scripts/reproduce.py --conventions closed-code   # all rows as the thesis' solver is taken to compute
     python scripts/reproduce.py --switches R8               # each switch of those conventions alone; without rows those that turn
+    python scripts/reproduce.py --without R8                # those conventions without each of their switches
     python scripts/reproduce.py --finest R6 R8              # at the thesis' columns
     python scripts/reproduce.py --geometry                  # over headspace, pressure and port width
     python scripts/reproduce.py --coarse R9                 # on the coarsest mesh, in seconds
@@ -24,9 +25,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from reproduction import ROWS, Lab, geometry
-from reproduction.report import DOCUMENT, FINE, columns_of, write_report
+from reproduction.report import DOCUMENT, FINE, columns_of, left_out, write_report
 from reproduction.row import Finding, Row
-from reproduction.settings import CONVENTIONS, alone
+from reproduction.settings import CONVENTIONS, Setting, alone
 from reproduction.store import ROOT
 from reproduction.thesis_mesh import AT_THESIS_COLUMNS
 
@@ -46,6 +47,9 @@ def arguments_of(arguments: list[str] | None) -> argparse.Namespace:
         "--switches",
         action="store_true",
         help="with each switch of closed-code alone; without rows those whose verdicts differ",
+    )
+    kind.add_argument(
+        "--without", action="store_true", help="with closed-code without each of its switches; rows as above"
     )
     kind.add_argument(
         "--geometry",
@@ -106,10 +110,10 @@ def once(one: Row) -> Callable[[Lab], Iterator[Finding]]:
     return findings
 
 
-def measure_switches(lab: Lab, rows: list[str]) -> None:
-    """Rows with each switch alone; by default those whose verdicts differ between the conventions."""
+def measure_switches(lab: Lab, rows: list[str], settings: dict[str, Setting]) -> None:
+    """Rows with each switch alone, or without it; by default those whose verdicts differ between the conventions."""
     for name in rows or columns_of(lab).turned:
-        for setting in alone().values():
+        for setting in settings.values():
             measure(replace(lab, setting=setting), name, name, once(ROWS[name]))
 
 
@@ -146,13 +150,22 @@ def main(arguments: list[str] | None = None) -> int:
     )
     if not (options.report or options.pictures):
         if options.switches:
-            measure_switches(lab, options.rows)
+            measure_switches(lab, options.rows, alone())
+        elif options.without:
+            measure_switches(lab, options.rows, left_out(lab))
         elif options.geometry:
             measure_geometry(lab, options.rows)
         else:
             measure_rows(lab, options.rows)
     if not options.coarse:
-        special = options.rows or options.report or options.switches or options.geometry or options.finest
+        special = (
+            options.rows
+            or options.report
+            or options.switches
+            or options.without
+            or options.geometry
+            or options.finest
+        )
         anew = not special and options.conventions == "mpm"
         write_report(lab, pictures=options.pictures or anew, document=options.document)
     return 0

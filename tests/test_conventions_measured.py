@@ -19,7 +19,10 @@ from reproduction import ROWS, Lab, geometry, thesis_mesh  # noqa: E402
 from reproduction.columns import (  # noqa: E402
     Columns,
     Found,
+    conditions,
+    holds,
     missing_text,
+    needed,
     revision_text,
     source,
     strays,
@@ -27,8 +30,8 @@ from reproduction.columns import (  # noqa: E402
     turning,
     turns_text,
 )
-from reproduction.report import columns_of  # noqa: E402
-from reproduction.row import HOLDS  # noqa: E402
+from reproduction.report import columns_of, left_out  # noqa: E402
+from reproduction.row import HOLDS, Checks  # noqa: E402
 from reproduction.settings import CONVENTIONS, Setting, alone  # noqa: E402
 from reproduction.store import BASES  # noqa: E402
 
@@ -128,21 +131,53 @@ def test_document_says_whether_its_columns_are_of_one_revision() -> None:
     assert strays(columns({"R1": finding()}, {"R1": finding()}), {"base": {"R13": finding()}}) == ""
 
 
+def test_conditions_are_read_back_from_verdicts() -> None:
+    """Every outcome of two comparisons. Fails when a verdict is read as something else than the comparisons that made it."""
+    for first in (True, False):
+        for second in (True, False):
+            checks = Checks({"a, ports 4.0 mm": first, "b": second})
+            assert holds(checks.verdict, "a, ports 4.0 mm") == first
+            assert holds(checks.verdict, "b") == second
+    assert conditions("reproduced", "reproduced only for: b (not for: a; c)") == ["a", "b", "c"]
+    assert conditions("reproduced", "not reproduced") == ["the row"]
+
+
 def test_row_that_turns_names_its_switches() -> None:
-    """Fails when a switch that gives the closed code's verdict, another one, or none, is told as something else."""
-    verdicts = dict.fromkeys(SWITCHES, HOLDS) | {SWITCHES[0]: "not reproduced", SWITCHES[1]: "in part"}
-    measured = {key: {"R8": finding(text)} for key, text in verdicts.items() if key != SWITCHES[-1]}
-    found = columns(
-        {"R8": finding(), "R9": finding()}, {"R8": finding("not reproduced"), "R9": finding()}, measured
-    )
-    assert found.turned == ["R8"]
-    assert turning(found, "R8") == {
-        **dict.fromkeys(SWITCHES, "nothing"),
-        SWITCHES[0]: "all of it",
-        SWITCHES[1]: "part of it",
-        SWITCHES[-1]: "not measured",
+    """Fails when a switch that turns a condition is not named for it, one that does not is, or one not measured passes for measured."""
+    closed = "reproduced only for: b (not for: a)"
+    verdicts = dict.fromkeys(SWITCHES, HOLDS) | {
+        SWITCHES[0]: closed,
+        SWITCHES[1]: "reproduced only for: a (not for: b)",
     }
-    assert f"| `{SWITCHES[0]}` | `{SWITCHES[1]}` | `{SWITCHES[2]}`" in turns_text(found)
+    measured = {key: {"R8": finding(text)} for key, text in verdicts.items() if key != SWITCHES[-1]}
+    found = columns({"R8": finding(), "R9": finding()}, {"R8": finding(closed), "R9": finding()}, measured)
+    assert found.turned == ["R8"]
+    rest = dict.fromkeys(SWITCHES[2:-1], False)
+    assert turning(found, "R8") == {
+        "a": {SWITCHES[0]: True, SWITCHES[1]: False, **rest},
+        "b": {SWITCHES[0]: False, SWITCHES[1]: True, **rest},
+    }
+    assert f"| R8 | a | holds | does not | `{SWITCHES[0]}` | `{SWITCHES[-1]}` | not measured |" in turns_text(
+        found
+    )
+    assert f"| R8 | b | holds | holds | `{SWITCHES[1]}` | `{SWITCHES[-1]}` |  |" in turns_text(found)
+
+
+def test_needed_are_switches_without_which_the_preset_does_not_turn_a_row() -> None:
+    """Fails when a switch that the preset can do without is called needed, or one that it cannot is not."""
+    left_out = {key: {"R12": finding("not reproduced")} for key in SWITCHES} | {
+        SWITCHES[3]: {"R12": finding()}
+    }
+    found = Columns({"R12": finding()}, {"R12": finding("not reproduced")}, {}, {}, left_out)
+    assert needed(found, "R12", "the row") == f"`{SWITCHES[3]}`"
+
+
+def test_preset_without_a_switch_lacks_it_alone(tmp_path: Path) -> None:
+    """Fails when leaving one switch out leaves more out, or nothing."""
+    own = conventions_of(lab(tmp_path).case("zone"))
+    for key, setting in left_out(lab(tmp_path)).items():
+        found = conventions_of(lab(tmp_path, setting).case("zone"))
+        assert found == {"preset": "closed-code", **CLOSED_CODE, key: own[key]}
 
 
 def test_switches_of_the_coarsest_mesh_stand_in_only_where_verdicts_agree() -> None:

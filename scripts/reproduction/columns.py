@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from reproduction import ROWS
@@ -12,17 +12,21 @@ from reproduction.thesis_mesh import AT_THESIS_COLUMNS, STATES
 
 Found = dict[str, dict[str, Any]]
 """Findings by row."""
+ONLY, NOT_FOR, WHOLE = "reproduced only for: ", " (not for: ", "the row"
+"""How a verdict in part is written (`reproduction.row.Checks`), and the one condition of a row that names none."""
 NAMES = {"mpm": "mpm", "closed-code": "closed code"}
 
 
 @dataclass(frozen=True)
 class Columns:
-    """What has been measured: findings by row under both conventions, by switch alone, and at the thesis' columns by convention."""
+    """What has been measured: findings by row under both conventions, at the thesis' columns by convention, by switch alone, and
+    by switch left out of the preset."""
 
     mpm: Found
     closed: Found
     alone: dict[str, Found]
     fine: dict[str, Found]
+    without: dict[str, Found] = field(default_factory=dict)
 
     @property
     def both(self) -> dict[str, Found]:
@@ -76,6 +80,7 @@ def strays(columns: Columns, geometry: dict[str, Found]) -> str:
     """Which of the other measurements were made with a program that neither column was measured with."""
     known = programs(columns.mpm) | programs(columns.closed)
     parts = {f"the switch `{key}` alone": found for key, found in columns.alone.items()}
+    parts |= {f"the preset without `{key}`": found for key, found in columns.without.items()}
     parts |= {f"the thesis' columns, *{NAMES[key]}*": found for key, found in columns.fine.items()}
     parts |= {f"geometry, {point}": found for point, found in geometry.items()}
     lines = [
@@ -137,18 +142,48 @@ def table(columns: Columns) -> str:
     return "## Verdicts\n\n" + summary + "\n\n" + revision_text(columns) + "\n".join(lines) + "\n\n"
 
 
-def turning(columns: Columns, name: str) -> dict[str, str]:
-    """What each switch alone does to the verdict of a row: "all of it", "part of it", "nothing" or "not measured".
+def conditions(*verdicts: str) -> list[str]:
+    """Names of the conditions that verdicts are made of, as far as one of them tells: one that holds or fails as a whole names none."""
+    names: dict[str, None] = {}
+    for verdict in verdicts:
+        if verdict.startswith(ONLY):
+            for part in verdict.removeprefix(ONLY).removesuffix(")").split(NOT_FOR):
+                names |= dict.fromkeys(part.split("; "))
+    return sorted(names) or [WHOLE]
 
-    "All of it" is the closed code's verdict, "part of it" one that is neither that nor the model's own.
-    """
+
+def holds(verdict: str, condition: str) -> bool:
+    """Whether a condition is fulfilled according to a verdict."""
+    if not verdict.startswith(ONLY):
+        return verdict == HOLDS
+    return condition in verdict.removeprefix(ONLY).partition(NOT_FOR)[0].split("; ")
+
+
+def turning(columns: Columns, name: str) -> dict[str, dict[str, bool]]:
+    """Conditions of a row that a switch alone, or the whole preset, turns: which switches turn it, of those that were measured."""
     own, closed = columns.mpm[name]["verdict"], columns.closed[name]["verdict"]
+    single = {key: found[name]["verdict"] for key, found in columns.alone.items() if name in found}
     found = {}
-    for key in alone():
-        one = columns.alone.get(key, {}).get(name)
-        verdict = one["verdict"] if one else None
-        found[key] = {None: "not measured", own: "nothing", closed: "all of it"}.get(verdict, "part of it")
+    for condition in conditions(own, closed, *single.values()):
+        before = holds(own, condition)
+        turns = {key: holds(verdict, condition) != before for key, verdict in single.items()}
+        if any(turns.values()) or holds(closed, condition) != before:
+            found[condition] = turns
     return found
+
+
+def needed(columns: Columns, name: str, condition: str) -> str:
+    """Switches without which the preset gives the model's own outcome of a condition; empty where that was not measured."""
+    own = holds(columns.mpm[name]["verdict"], condition)
+    if own == holds(columns.closed[name]["verdict"], condition):
+        return ""
+    left_out = {key: found[name]["verdict"] for key, found in columns.without.items() if name in found}
+    if len(left_out) < len(alone()):
+        return "not measured"
+    return (
+        ", ".join(f"`{key}`" for key, verdict in left_out.items() if holds(verdict, condition) == own)
+        or "none"
+    )
 
 
 def source(columns: Columns, coarse: Columns | None, name: str) -> Columns:
@@ -167,40 +202,41 @@ def source(columns: Columns, coarse: Columns | None, name: str) -> Columns:
 
 
 def turns_text(columns: Columns, coarse: Columns | None = None) -> str:
-    """The rows whose verdicts differ between the conventions, and which switch turns each, alone."""
+    """The conditions of rows that the conventions turn, and which switch turns each, alone."""
     text = "## Rows that turn with the conventions\n\n"
     if not columns.turned:
         return text + "Of the rows measured under both conventions none.\n\n"
     text += (
-        "Each switch of the preset was set alone in the model's own conventions (`scripts/reproduce.py --switches R8`). "
-        "*All of it*: the verdict is then the closed code's; *part of it*: it is neither this nor the model's own.\n\n"
-    )
-    text += (
-        "| | verdict | verdict, closed code | all of it | part of it | nothing | not measured |\n"
+        "Each switch of the preset was set alone in the model's own conventions (`scripts/reproduce.py --switches R8`). Listed is every "
+        "condition of these rows that the preset or one of its switches turns. *Needed*: without it the preset does not turn the condition "
+        "(`scripts/reproduce.py --without R12`).\n\n"
+        "| | condition | mpm | closed code | turned by these switches, each alone | not measured alone | needed |\n"
         + "|---" * 7
         + "|\n"
     )
     for name in columns.turned:
         measured = source(columns, coarse, name)
-        effects = turning(measured, name)
         mesh = " (coarsest mesh, where both verdicts are the same)" if measured is coarse else ""
-        cells = [name + mesh, columns.mpm[name]["verdict"], columns.closed[name]["verdict"]]
-        for effect in ("all of it", "part of it", "nothing", "not measured"):
-            keys = [f"`{key}`" for key, what in effects.items() if what == effect]
-            cells.append(", ".join(keys) or "none" if effect != "not measured" else ", ".join(keys))
-        text += "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
+        own, closed = (found[name]["verdict"] for found in columns.both.values())
+        for condition, turns in turning(measured, name).items():
+            cells = [name + mesh, condition]
+            cells += ["holds" if holds(verdict, condition) else "does not" for verdict in (own, closed)]
+            cells.append(", ".join(f"`{key}`" for key, turned in turns.items() if turned) or "none")
+            cells.append(", ".join(f"`{key}`" for key in alone() if key not in turns))
+            cells.append(needed(columns, name, condition))
+            text += "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
     return text + "\n" + details(columns, coarse) + "\n"
 
 
 def details(columns: Columns, coarse: Columns | None) -> str:
-    """What was measured under each switch that turns a row."""
+    """What was measured under each switch alone that changes a number of the row."""
     lines = []
     for name in columns.turned:
         measured = source(columns, coarse, name)
-        for key, effect in turning(measured, name).items():
-            if effect in ("all of it", "part of it"):
-                one = measured.alone[key][name]
-                lines.append(f"* **{name}**, `{key}` alone: {one['measured']}: {one['verdict']}.\n")
+        for key in alone():
+            one = measured.alone.get(key, {}).get(name)
+            if one and one["measured"] != measured.mpm[name]["measured"]:
+                lines.append(f"* **{name}**, `{key}` alone: {one['measured']}.\n")
     return "".join(lines)
 
 

@@ -6,12 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from meshes import MESHES
+from mpm.case.conventions import conventions_of
 from mpm.files import write_atomically
 from reproduction import ROWS
 from reproduction.columns import Columns, Found, missing_text, strays, table, turns_text
 from reproduction.geometry import POINTS, ROW_NAMES, section, settings
 from reproduction.row import HOLDS
-from reproduction.settings import CONVENTIONS, Setting, alone
+from reproduction.settings import CONVENTIONS, Setting, alone, without
 from reproduction.store import ROOT, Lab
 from reproduction.thesis_mesh import AT_THESIS_COLUMNS
 
@@ -102,12 +103,18 @@ def found_by(lab: Lab, setting: Setting, names: tuple[str, ...] = tuple(ROWS), s
     return found
 
 
+def left_out(lab: Lab) -> dict[str, Setting]:
+    """The preset without each of its switches."""
+    return without(conventions_of(replace(lab, setting=CONVENTIONS["mpm"]).case("zone")))
+
+
 def columns_of(lab: Lab) -> Columns:
     """Everything that has been measured under the conventions and the switches."""
     return Columns(
         mpm=found_by(lab, CONVENTIONS["mpm"]),
         closed=found_by(lab, CONVENTIONS["closed-code"]),
         alone={key: found_by(lab, setting) for key, setting in alone().items()},
+        without={key: found_by(lab, setting) for key, setting in left_out(lab).items()},
         fine={
             key: found_by(lab, setting, tuple(AT_THESIS_COLUMNS), f" {FINE}")
             for key, setting in CONVENTIONS.items()

@@ -45,3 +45,10 @@ CONVENTIONS = {"mpm": MPM, "closed-code": Setting("closed-code", {"conventions":
 def alone() -> dict[str, Setting]:
     """Each switch of the closed code's preset alone, by its dotted key."""
     return {key: Setting(f"alone/{key}", {key: value}) for key, value in CLOSED_CODE.items()}
+
+
+def without(own: Mapping[str, Any]) -> dict[str, Setting]:
+    """The closed code's preset without one of its switches, by its dotted key; `own` has the model's value of each."""
+    return {
+        key: Setting(f"without/{key}", {"conventions": "closed-code", key: own[key]}) for key in CLOSED_CODE
+    }
