@@ -30,6 +30,7 @@ SECTIONS: dict[str, Callable[[Lab], str]] = {
     "added": dispersion.added,
     "columns": columns.table,
     "models": columns.models,
+    "swing": dispersion.swing,
     "force": force.table,
     "switches": switches.table,
 }

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
 
 import vibration  # noqa: E402
-from vibration_sections import columns, dispersion, extrapolation, readings, store, switches, theory  # noqa: E402
+from vibration_sections import columns, dispersion, extrapolation, force, readings, store, switches, theory  # noqa: E402
 
 THESIS = ROOT / "cases" / "thesis" / "single_zone.toml"
 OMEGA, PEAK, VISCOSITY, DIFFUSIVITY = 32.0 * np.pi, 1.69016765e-2, 1.72e-5 / 0.72167, 2.88e-5
@@ -65,7 +65,7 @@ def test_layers_are_channels_where_nothing_passes() -> None:
 
 
 def test_schemes_add_what_their_formulas_say() -> None:
-    """Fails when upwinding adds something else than |u| h/2, fitting something else than about a third of its square, for one velocity."""
+    """Fails when upwinding adds something else than |u| h/2, fitting than a third of its square, a step than u^2 dt/2, for one velocity."""
     speed, along, width = 0.01, 1e-5, 2e-4
     layer = theory.Layer(
         name="gas",
@@ -79,6 +79,7 @@ def test_schemes_add_what_their_formulas_say() -> None:
     z = speed * width / 2.0 / along
     assert theory.added_by_scheme(layer, width, "upwind") == pytest.approx(z, rel=1e-12)
     assert theory.added_by_scheme(layer, width, "fitted") == pytest.approx(z**2 / 3.0, rel=1e-3)
+    assert theory.added_by_steps(layer, 2e-3) == pytest.approx(speed**2 * 1e-3 / along, rel=1e-12)
 
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 2.0])
@@ -144,6 +145,16 @@ def test_a_section_measures_its_table(name: str, tmp_path: Path) -> None:
     assert not re.search(r"\b(nan|inf)\b", measured + shown)
 
 
+def test_force_of_a_prescribed_flight() -> None:
+    """Fails when weight, carried share or gas force of the thesis' flight are not those found by hand, R (U - w)."""
+    found = force.pressures(store.Lab(), 0.3)
+    resistance, through = 1.72e-5 * 3e-3 / 4.25e-12, 2.0 * 0.035 * 4e-3 / 0.1397
+    assert found["weight"] == pytest.approx(0.54 * 2500.0 * 9.81 * 3e-3, rel=1e-9)
+    assert found["carried"] == pytest.approx(resistance * through, rel=1e-9)
+    assert found["largest"] == pytest.approx(resistance * (through + 0.004 + 0.3 * 9.81 / OMEGA), rel=1e-5)
+    assert found["least"] == pytest.approx(resistance * (through + 0.004 - 0.3 * 9.81 / OMEGA), rel=1e-5)
+
+
 def test_every_switch_is_in_the_table() -> None:
     """Fails when a switch of the preset is missing from docs/conventions.md's table, or a reading types a key that is none."""
     from mpm.case.conventions import CLOSED_CODE
@@ -153,3 +164,43 @@ def test_every_switch_is_in_the_table() -> None:
     typed = {key for reading in readings.READINGS.values() for key in reading}
     assert typed <= {*CLOSED_CODE, "conventions"}
     assert set(columns.NUMERICS) == {"ours", "upwinding", "closed-code"}
+
+
+def cells(name: str, table: int = 0) -> list[list[str]]:
+    """Cells of a table of the page that a section has written."""
+    begin, end = vibration.marks(name)
+    text = vibration.document(name).read_text(encoding="utf-8").split(begin)[1].split(end)[0]
+    block = re.findall(r"(?:^\|.*\n?)+", text, re.MULTILINE)[table]
+    return [[c.strip() for c in line.strip("| ").split(" | ")] for line in block.strip().splitlines()]
+
+
+def column(name: str, row: str, head: str, table: int = 0) -> float:
+    """The first number of a cell, by the beginning of its row and the last column of exactly that heading."""
+    found = cells(name, table)
+    line = next(line for line in found if " ".join(line).startswith(row))
+    at = max(i for i, text in enumerate(found[0]) if text == head)
+    return float(line[at].split()[0])
+
+
+def test_the_answer_is_that_of_the_tables() -> None:
+    """Fails when tables have been measured again and the words above them tell older numbers."""
+    fitted, upwind = (column("readings", row, "gain") for row in ("ours", "upwinding"))
+    preset = column("readings", '`conventions = "closed-code"`', "Gamma 0.3")
+    level = preset - column("readings", "ours", "Gamma 0.3")
+    plain, dispersed = (column("models", f"{row} 0.", "Gamma 0.6") for row in ("steady", "steady + K"))
+    words = [
+        (r"vibration adds \*\*([\d.]+) %\*\*", column("dispersion", "0.3", "bed"), 0.05),
+        (r"at 0.6 \*\*([\d.]+) %\*\*", column("dispersion", "0.6", "bed"), 0.05),
+        (r"upwinding adds (\d+) and \d+ %", column("added", "0.3 bed", "upwinding"), 0.5),
+        (r"upwinding adds \d+ and (\d+) %", column("added", "0.6 bed", "upwinding"), 0.5),
+        (r"raises that coverage by \*\*([\d.]+)\*\*", upwind, 6e-5),
+        (r"exponentially fitted fluxes by \*\*([\d.]+)\*\*", fitted, 6e-5),
+        (r"change the coverage by ([\d.]+\d)", level, 6e-4),
+        (r"before the inlet by [\d.]+ to (\d\.\d+)", dispersed - plain, 6e-5),
+        (r"gas forces from −(\d+) to", -float(cells("force")[2][3].split()[0]), 0.5),
+    ]
+    text = re.sub(r"\s+", " ", vibration.ANSWER.read_text(encoding="utf-8"))
+    for pattern, measured, within in words:
+        said = re.search(pattern, text)
+        assert said is not None, pattern
+        assert float(said[1]) == pytest.approx(measured, abs=within), pattern

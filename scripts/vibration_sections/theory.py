@@ -181,3 +181,11 @@ def added_by_scheme(layer: Layer, width: float, scheme: str) -> float:
     small = z < 1e-4
     z = np.where(small, 1.0, z)
     return float(np.where(small, 0.0, z / np.tanh(z) - 1.0).mean())
+
+
+def added_by_steps(layer: Layer, step: float) -> float:
+    """What backward Euler with this `step` [s] adds to diffusion along x over D_eff, mean over a cycle and the layer.
+
+    u^2 dt/(2 eps D_eff).
+    """
+    return float((layer.velocity() ** 2).mean() * step / (2.0 * layer.eps * layer.along))
