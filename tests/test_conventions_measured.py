@@ -234,7 +234,7 @@ def test_sweep_says_what_turns_a_row() -> None:
     base = {"R21": {**finding("reproduced"), "numbers": numbers}}
     narrow = {"R21": {**finding("not reproduced"), "numbers": {"2.2 mm": {"largest from 30 s": 0.2}}}}
     text = geometry.section({"base": base, "ports 2.2 mm": narrow, "626 Torr": base})
-    assert "**R21** turns at ports 2.2 mm." in text
+    assert "**R21**: ports 2.2 mm." in text
     assert "| ports 2.2 mm | not measured |" in text
     assert "**no**: 0.200" in text
     part = "reproduced only for: start-up spike, ports {} (not for: removed, ports {})"

@@ -114,8 +114,7 @@ def depends(measured: Measured) -> str:
             continue
         others = {name: rows[row] for name, rows in measured.items() if name != "base" and row in rows}
         turned = [name for name, found in others.items() if bare(found) != bare(base)]
-        text = "at " + ", at ".join(turned) if turned else "at none of the points"
-        lines.append(f"* **{row}** turns {text}.")
+        lines.append(f"* **{row}**: {'; '.join(turned) or 'none of the points'}.")
     return "\n".join(lines)
 
 
@@ -141,5 +140,8 @@ def section(measured: Measured) -> str:
         ]
         text += f"| {name} | " + " | ".join(cells) + " |\n"
     return (
-        text + "\nWhich verdict turns where, against the base of this table:\n\n" + depends(measured) + "\n\n"
+        text
+        + "\nPoints at which a row has another verdict than at the base of this table:\n\n"
+        + depends(measured)
+        + "\n\n"
     )
