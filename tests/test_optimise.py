@@ -12,6 +12,7 @@ import pytest
 from mpm.advice.doses import doses_of
 from mpm.case.case import load_case
 from mpm.cli import main
+from mpm.cli.searchover import print_over
 from mpm.cli.searchscreen import print_point
 from mpm.errors import ConvergenceError, InputError
 from mpm.optimise import Point, Search, optimise
@@ -113,17 +114,54 @@ def test_what_another_key_does_to_the_doses(tmp_path: Path, capsys: pytest.Captu
 
 @pytest.mark.parametrize(
     "over",
-    ["motion.gamma", "motion.gamma=", "=0.3", "motion.gamma=0.3,0.3", "motion.gama=0.3", "motion.gamma=fast"],
+    [
+        "motion.gamma",
+        "motion.gamma=",
+        "=0.3",
+        "motion.gamma=0.3,0.3",
+        "motion.gama=0.3",
+        "motion.gamma=fast",
+        "geometry.inlet.tma.mass_fractions.TMA=1e-4,2e-4",
+    ],
 )
 def test_a_search_over_nonsense_is_one_line(
     over: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Fails when a list of values that is none, or a value that no case has, is more than one line, or leaves a directory."""
+    """Fails when a list of values that is none, a value that no case has, or a dose, is more than one line, or leaves a
+    directory."""
     assert (
         main(["optimise", str(CASES / "single_zone.toml"), "-o", str(tmp_path / "new"), "--over", over]) == 2
     )
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert not (tmp_path / "new").exists()
+
+
+def test_numbers_that_no_search_takes_are_told_once_over_all_values(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when a target that is none is found only at each value, as if there were no doses, or leaves a directory."""
+    arguments = ["optimise", str(CASES / "single_zone.toml"), "-o", str(tmp_path / "new"), "--target", "2"]
+    assert main([*arguments, "--over", "motion.gamma=0.3,0.45"]) == 2
+    assert capsys.readouterr().err.strip().splitlines() == [
+        "optimise: --target: found 2; accepted: above 0 and at most 1"
+    ]
+    assert not (tmp_path / "new").exists()
+
+
+def test_values_of_a_search_are_told_as_typed(capsys: pytest.CaptureFixture[str]) -> None:
+    """Fails when a search over the bed's speed shows it without its unit, or one that chooses velocities does not tell them."""
+    row = {
+        "motion.bed_velocity": 0.01,
+        "geometry.inlet.tma.mass_fractions.TMA": 1e-4,
+        "geometry.inlet.tma.velocity": 0.04,
+        "excess_number.tma": 0.99,
+    }
+    print_over("motion.bed_velocity", ["1 cm/s"], [row], Path("found"), screen())
+    told = " ".join(capsys.readouterr().out.replace("\u00a0", " ").split())
+    assert (
+        "1 cm/s: bed at 1 cm/s; mass fraction tma 0.0001, tma at 4 cm/s; molecules per site 0.99 of tma"
+        in told
+    )
 
 
 def test_a_coverage_a_little_below_the_target_is_said_to_be_so(capsys: pytest.CaptureFixture[str]) -> None:

@@ -106,13 +106,18 @@ def _least_enough(case: Case, inlet: Inlet, key: str, target: float) -> float:
 
 def checked_doses(case: Case, target: float, weight: float, velocities: bool, limit: int) -> list[Dose]:
     """`doses_of` with the numbers of the command line checked, too. Raises InputError."""
+    check_numbers(target, weight, limit)
+    return doses_of(case, target, velocities)
+
+
+def check_numbers(target: float, weight: float, limit: int) -> None:
+    """Raise InputError for numbers of the command line with which no search can begin."""
     if not 0.0 < target <= 1.0:
         raise InputError.at(VERB, "--target", f"{target:g}", "above 0 and at most 1")
     if not 0.0 <= weight < math.inf:
         raise InputError.at(VERB, "--weight", f"{weight:g}", "a finite number from 0")
     if limit < 1:
         raise InputError.at(VERB, "--limit", f"{limit}", "a whole number from 1")
-    return doses_of(case, target, velocities)
 
 
 def refuse_inlet(case: Case, inlet: Inlet) -> None:

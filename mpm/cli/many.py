@@ -84,7 +84,7 @@ def optimise(
     loaded = load_case(case, parse_settings(settings))
     directory = output or Path("results") / "optimise" / Path(case).stem
 
-    from mpm.advice.doses import checked_doses
+    from mpm.advice.doses import check_numbers, checked_doses
     from mpm.cli.searchover import search_over, variants
     from mpm.optimise import Search, make_directory
     from mpm.parallel import on_root
@@ -101,7 +101,8 @@ def optimise(
     if over is None:
         search(loaded, directory)
         return
-    key, cases = variants(loaded, over)
+    check_numbers(target, weight, limit)  # what is wrong at every value is told once
+    key, cases = variants(loaded, over, velocities)
     on_root(MPI.COMM_WORLD, lambda: make_directory(directory))
     search_over(key, cases, directory, search, console)
 

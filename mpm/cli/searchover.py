@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mpm.case.settings import parse_settings
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
+from mpm.report.dosing import inlet_excess
 from mpm.screen import number, say
 
 if TYPE_CHECKING:
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from mpm.optimise import Search
 
 EXAMPLE = "motion.gamma=0.3,0.45,0.6"
+BED = "motion.bed_velocity"
+"""The column of the bed's speed [m/s]; a search over it has the number there in place of the text."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,17 +34,33 @@ class Variant:
     case: Case
 
 
-def variants(case: Case, over: str) -> tuple[str, list[Variant]]:
-    """The key, and the case at each value. Raises InputError for what is no such list, and where a case is refused."""
+def variants(case: Case, over: str, velocities: bool) -> tuple[str, list[Variant]]:
+    """The key, and the case at each value. Raises InputError for what is no such list, for a dose, which the search chooses itself (port
+    velocities too with `velocities`), and where a case is refused."""
     key, equals, values = over.partition("=")
     texts = [text.strip() for text in values.split(",")]
     if not equals or not key.strip() or not all(texts) or len(set(texts)) < len(texts):
         raise InputError.at("--over", "", repr(over), f"KEY=VALUE,VALUE,..., e.g. {EXAMPLE}", given="")
+    if key.strip() in _chosen(case, velocities):
+        raise InputError.at(
+            "--over", "", f"{key.strip()}, which the search chooses", "a key that is no dose", given=""
+        )
     found = []
     for text in texts:
         settings: dict[str, Any] = parse_settings([f"{key}={text}"])
         found.append(Variant(text=text, case=case.with_(settings)))
     return key.strip(), found
+
+
+def _chosen(case: Case, velocities: bool) -> set[str]:
+    """Keys of the doses that the search varies."""
+    found = set()
+    for inlet in case.geometry.inlets:
+        excess = inlet_excess(case, inlet)
+        if excess is not None:
+            found.add(f"geometry.inlet.{inlet.name}.mass_fractions.{excess.species}")
+            found |= {f"geometry.inlet.{inlet.name}.velocity"} if velocities else set()
+    return found
 
 
 def folder_of(directory: Path, text: str) -> Path:
@@ -63,7 +82,7 @@ def search_over(
     """
     rows: list[dict[str, Any]] = []
     for variant in cases:
-        row: dict[str, Any] = {key: variant.text, "motion.bed_velocity": variant.case.conveying_velocity}
+        row: dict[str, Any] = {key: variant.text, BED: variant.case.conveying_velocity}
         if console is not None:
             console.print()
             say(console, f"{key} = {variant.text}: bed at {_speed(row)}")
@@ -77,7 +96,7 @@ def search_over(
         if console is not None:
             write_atomically(directory / "over.csv", _table(rows))
     if console is not None:
-        print_over(key, rows, directory, console)
+        print_over(key, [variant.text for variant in cases], rows, directory, console)
     if all("reason" in row for row in rows):
         raise ConvergenceError(f"optimise: no value of {key} has doses that reach the target")
 
@@ -100,11 +119,13 @@ def _table(rows: list[dict[str, Any]]) -> str:
     return text.getvalue()
 
 
-def print_over(key: str, rows: list[dict[str, Any]], directory: Path, console: Console) -> None:
-    """The best doses side by side."""
+def print_over(
+    key: str, texts: list[str], rows: list[dict[str, Any]], directory: Path, console: Console
+) -> None:
+    """The best doses side by side, by the values as they were typed."""
     console.print()
     say(console, f"Best doses over {key}:")
-    for row in rows:
+    for text, row in zip(texts, rows, strict=True):
         if "reason" in row:
             said = "no doses found"
         else:
@@ -114,11 +135,16 @@ def print_over(key: str, rows: list[dict[str, Any]], directory: Path, console: C
                 for name, value in row.items()
                 if ".mass_fractions." in name
             ]
+            doses += [
+                f"{name.split('.')[2]} at {number(1e2 * value, 'cm/s')}"
+                for name, value in row.items()
+                if name.startswith("geometry.inlet.") and name.endswith(".velocity") and name != key
+            ]
             used = ", ".join(f"{row[f'excess_number.{inlet}']:.4g} of {inlet}" for inlet in inlets)
             said = f"mass fraction {', '.join(doses)}; molecules per site {used}"
-        say(console, f"{row[key]}: bed at {_speed(row)}; {said}", 2)
+        say(console, f"{text}: bed at {_speed(row)}; {said}", 2)
     say(console, f"Results: {directory}: over.csv, and a directory per value")
 
 
 def _speed(row: dict[str, Any]) -> str:
-    return number(1e2 * row["motion.bed_velocity"], "cm/s")
+    return number(1e2 * row[BED], "cm/s")
