@@ -61,7 +61,7 @@ def _says(model: Any, key: str) -> bool:
 def _of_motion(case: Case) -> Idle:
     motion, dispersed = case.motion, case.transport.vibrational_dispersion
     if motion.gamma == 0.0:
-        still = (*_CYCLE, *FORCES)
+        still = (*_CYCLE, *(FORCES if motion.balances else ()))  # others name them in _of_forces
         cycle = still[1:] if case.fidelity == "resolved" else still  # whose steps are parts of a cycle
         yield from _typed(motion, "motion", cycle, "nothing vibrates (gamma = 0)")
         yield from _typed(
@@ -100,7 +100,7 @@ def _of_forces(motion: Motion) -> Idle:
     yield from _typed(
         motion, "motion", ["bed_velocity"], "forces decide how fast the bed moves (motion.profile)"
     )
-    if motion.through_velocity is not None:
+    if motion.through_velocity is not None and motion.gamma > 0.0:
         yield from _typed(
             motion, "motion", ["through_flow"], "motion.through_velocity says how much gas rises"
         )

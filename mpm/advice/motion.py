@@ -61,11 +61,12 @@ def force_rows(sheet: Sheet, motion: dict[str, Any], marked: Marked) -> None:
     sheet.add(
         "gas rising through the bed",
         f"{number(motion['through_velocity'] * 1e2, 'cm/s')}, which carries {percent(motion['gas_share'])} of its "
-        f"{number(motion['weight'], 'Pa', 3)}",
+        f"weight, {number(motion['weight'], 'Pa', 3)}",
         part=True,
     )
     for name, velocity in motion["rising_velocity"].items():
         sheet.add(f"gas rising above {name}", number(velocity * 1e2, "cm/s"), part=True)
+    sheet.add("phases of its cycle", "from where the reactor passes its mean position upwards", part=True)
     for phase in motion["phases"]:
         start, stop = (math.degrees(phase[key]) for key in ("from", "to"))
         word = {"stick": "moves with the reactor", "slide": "slides", "flight": "flies"}[phase["kind"]]

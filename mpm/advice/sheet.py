@@ -286,5 +286,5 @@ def _cost(sheet: Sheet, case: Case, report: dict[str, Any], marked: Marked) -> N
     if case.follows_cycle and "flow_courant" in run:
         sheet.add("Courant number of the gas, at most", number(run["flow_courant"], digits=2))
     if "numerical_diffusion" in run:
-        share = number(100.0 * run["numerical_diffusion"], "% of the diffusivity", 2)
+        share = number(100.0 * run["numerical_diffusion"], "% of the diffusivity", 3)
         sheet.add("numerical diffusion along the bed", share)

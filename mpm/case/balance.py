@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from mpm.case.throughflow import Throughflow, fastest_rise, total_throughflow
+from mpm.physics.bed_balance import LONGEST_FLIGHT
 from mpm.physics.bed_cycle import NoCycle, bed_cycle
 from mpm.physics.bed_forces import BedForces, Carried
 from mpm.units import reject
@@ -87,6 +88,12 @@ def complete_motion(motion: Motion, geometry: Geometry, gas: Gas) -> None:
     try:
         motion.complete(bed_cycle(forces))
     except Carried:
+        if forces.gas_share < 1.0:
+            raise reject(
+                f"force_balance at gamma = {motion.gamma:g}: the bed does not come down within {LONGEST_FLIGHT} cycles",
+                "a smaller gamma, or another profile",
+                key="motion.profile",
+            ) from None
         rising, share = forces.through_flow * 100.0, forces.gas_share
         raise reject(
             f"force_balance with {rising:.3g} cm/s of gas through the bed, {share:.3g} times what carries it: it floats away",

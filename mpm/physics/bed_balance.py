@@ -29,8 +29,6 @@ from mpm.physics.waves import NEXT, Wave, root
 Kind = Literal["stick", "slide", "flight"]
 LONGEST_FLIGHT = 100
 """Cycles of a flight beyond which a bed counts as carried."""
-
-
 SHORT = 1e-4
 """Phase [rad] of a slide so slow that rounding hides it."""
 
@@ -97,10 +95,6 @@ class Stretch:
     def height(self, phase: float) -> float:
         """Gap below the bed [m]; 0 in contact."""
         return _Flight(self.forces, self.begin).gap(phase) if self.kind == "flight" else 0.0
-
-    def earlier(self, turns: int = 1) -> Stretch:
-        """The same counted from so many cycles later."""
-        return replace(self, begin=self.begin - turns * TURN, end=self.end - turns * TURN)
 
 
 class _Flight:
