@@ -111,6 +111,16 @@ def test_nobody_typed_what_a_preset_brings(tmp_path: Path) -> None:
     assert idle_keys(typed) == ["porous.diffusion: no layer is porous"]
 
 
+def test_a_preset_that_comes_too_late_is_named(tmp_path: Path) -> None:
+    """Fails when the preset, set over the case.toml of a run, in which every switch is typed, is silently without effect."""
+    for name, other in (("mpm", "closed-code"), ("closed-code", "mpm")):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(zone({"conventions": name}, MICRO).to_toml(), encoding="utf-8")
+        assert not any(said.startswith("conventions") for said in idle_keys(load_case(path)))
+        told = idle_keys(load_case(path, {"conventions": other}))
+        assert "conventions: every switch is typed, and otherwise" in told
+
+
 @pytest.mark.parametrize(
     ("drag", "inertia", "share"),
     [

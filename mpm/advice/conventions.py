@@ -56,14 +56,21 @@ def convention_caveats(case: Case) -> list[str]:
 
 
 def idle_switches(case: Case) -> Iterator[tuple[str, str]]:
-    """Switches that somebody set otherwise than the preset of the case does and that nothing reads, each with the reason."""
-    usual = PRESETS["closed-code"] if case.conventions == "closed-code" else {}
+    """Switches that somebody set otherwise than the preset of the case does and that nothing reads, each with the reason; the preset itself
+    where every switch is typed, as in the case.toml of a run, and none as it would have it."""
+    usual = PRESETS[case.conventions]
+    own = {key: usual.get(key, _default(case, key)) for key in SWITCHES}
+    if "conventions" in case.model_fields_set and all(switches(case)[key] != own[key] for key in SWITCHES):
+        yield "conventions", "every switch is typed, and otherwise"
     for key, why in _unread(case).items():
         table, _, last = key.partition(".")
-        model = getattr(case, table)
-        default = usual.get(key, type(model).model_fields[last].get_default())
-        if last in case.typed(table) and getattr(model, last) != default:
+        if last in case.typed(table) and switches(case)[key] != own[key]:
             yield key, why
+
+
+def _default(case: Case, key: str) -> Any:
+    table, _, last = key.partition(".")
+    return type(getattr(case, table)).model_fields[last].get_default()
 
 
 def _unread(case: Case) -> dict[str, str]:
