@@ -95,7 +95,8 @@ def test_what_has_no_balance_is_one_line(changes: dict[str, Any], text: str) -> 
 
 
 def test_with_outlets_on_both_sides_the_typed_velocity_counts() -> None:
-    """Fails when a case that says how much gas rises is refused for its outlets."""
+    """Fails when a case that says how much gas rises is refused for its outlets, or one that nothing shakes, where none is asked for."""
+    assert load_case("single_zone", FORCES | BOTH | {"motion.gamma": 0.0}).motion.mean_velocity == 0.0
     case = load_case("single_zone", FORCES | BOTH | {"motion.through_velocity": f"{PORTS!r} m/s"})
     assert case.motion.mean_velocity == pytest.approx(base().motion.mean_velocity, rel=1e-9)
 

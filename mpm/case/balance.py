@@ -76,14 +76,15 @@ def complete_motion(motion: Motion, geometry: Geometry, gas: Gas) -> None:
             'a density of the solid, e.g. "2500 kg/m^3", for motion.profile = "force_balance"',
             key=f"material.{layer.material_name}.density",
         )
-    if motion.through_velocity is None and total_throughflow(geometry, gas) is None:
+    shaken = motion.gamma > 0.0
+    if shaken and motion.through_velocity is None and total_throughflow(geometry, gas) is None:
         raise reject(
             "nothing, and outlets on both sides of the bed, where the ports do not tell how much gas rises through it",
             'a superficial velocity, e.g. "0.2 cm/s", for motion.profile = "force_balance"',
             key="motion.through_velocity",
         )
     forces = forces_on_bed(motion, geometry, gas)
-    if forces is None or motion.gamma == 0.0:
+    if forces is None or not shaken:
         return
     try:
         motion.complete(bed_cycle(forces))
