@@ -220,6 +220,21 @@ def test_numerical_diffusion(case: Case) -> None:
     assert eng.numerical_diffusion(still, grid) == 0.0
 
 
+@pytest.mark.parametrize(("width", "central"), [("0.34 mm", 0.0), ("5 mm", None)])
+def test_numerical_diffusion_of_the_other_schemes(case: Case, width: str, central: float | None) -> None:
+    """Fails when upwinding is not said to add Pe/2, or central differences nothing up to Pe = 2 and Pe/2 - 1 beyond."""
+    bed = case.geometry.moving_layer
+    assert bed is not None
+    for law, left in (("effective", 0.46 / bed.solid.tortuosity_factor[0]), ("free", 1.0)):
+        changes = {"geometry.cell_width": width, "porous.diffusion": law}
+        upwind, hybrid = (case.with_({**changes, "transport.scheme": s}) for s in ("upwind", "central"))
+        grid = Grid.from_case(upwind)
+        half = 0.5 * 0.46 * 0.013 * grid.dx / (left * 2.88e-5)
+        assert eng.numerical_diffusion(upwind, grid) == pytest.approx(half, rel=1e-9)
+        expected = max(half - 1.0, 0.0) if central is None else central
+        assert eng.numerical_diffusion(hybrid, grid) == pytest.approx(expected, rel=1e-9)
+
+
 def test_numbers_that_do_not_exist_are_absent() -> None:
     """No bed, no flow, no vibration: nothing is zero or NaN for want of a value."""
     layer = [{"name": "gas", "height": "1 mm", "cells": 2}]

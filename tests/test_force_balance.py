@@ -47,6 +47,11 @@ def test_the_balance_is_that_of_the_case() -> None:
     assert forces.weight == pytest.approx(39.7305, rel=1e-9)
     assert forces.resistance == pytest.approx(12141.18, rel=1e-6)
     assert forces.through_flow == pytest.approx(PORTS, rel=1e-12) and forces.lag == 0.0
+    upright = case.with_(
+        {"material.glass_beads.permeability": ["8.5 um^2", "4.25 um^2"]}
+    )  # along and through
+    across = forces_on_bed(upright.motion, upright.geometry, upright.gas)
+    assert across is not None and across.resistance == pytest.approx(forces.resistance, rel=1e-12)
     assert 100.0 * case.motion.mean_velocity == pytest.approx(0.508, abs=5e-4)
     prescribed = load_case("single_zone")
     ratio = prescribed.motion.mean_velocity / case.motion.mean_velocity
