@@ -113,12 +113,12 @@ def test_gas_spreads_in_the_plenum(case: Case) -> None:
     even = (2 * 0.035 * 4e-3) / 0.1397
     path = case.gas.mean_free_path
     assert spreading_length(case.geometry, path) == pytest.approx(3.654, rel=1e-3)
-    assert rising_velocity(case.geometry, path, 0.1048) == pytest.approx(even, rel=1e-3)
+    assert rising_velocity(case.geometry, case.gas, 0.1048) == pytest.approx(even, rel=1e-3)
     tight = case.with_({"geometry.layer.plenum.height": "0.1 mm"}).geometry
     decay = spreading_length(tight, path)
     assert decay == pytest.approx(math.sqrt(1e-12 * flow_resistance(tight, path) / 12.0), rel=1e-12)
-    assert rising_velocity(tight, path, 0.1048) == pytest.approx(0.035 * 4e-3 / (2 * decay), rel=0.01)
-    assert rising_velocity(tight, path, 0.07) < 0.2 * rising_velocity(tight, path, 0.1048)
+    assert rising_velocity(tight, case.gas, 0.1048) == pytest.approx(0.035 * 4e-3 / (2 * decay), rel=0.01)
+    assert rising_velocity(tight, case.gas, 0.07) < 0.2 * rising_velocity(tight, case.gas, 0.1048)
 
 
 @pytest.mark.parametrize("periodic", [True, False])
@@ -127,7 +127,7 @@ def test_rising_gas_is_all_the_gas_that_is_fed(case: Case, periodic: bool) -> No
     changed = case.with_({"geometry.periodic": periodic, "geometry.layer.plenum.height": "0.5 mm"})
     n = 4000
     points = [(i + 0.5) * 0.1397 / n for i in range(n)]
-    flow = sum(rising_velocity(changed.geometry, changed.gas.mean_free_path, x) for x in points) * 0.1397 / n
+    flow = sum(rising_velocity(changed.geometry, changed.gas, x) for x in points) * 0.1397 / n
     assert flow == pytest.approx(2 * 0.035 * 4e-3, rel=1e-5)
 
 

@@ -178,13 +178,19 @@ def test_all_fidelities_run(fidelity: str, gamma: float) -> None:
 
 
 def test_most_that_rises_above_a_port_carries_more() -> None:
-    """Fails when `local` is not the estimate of `mpm check`, which in a narrow plenum is more than the mean."""
+    """Fails when `local` is not the estimate of `mpm check`, which in a narrow plenum is more than the mean, or gas that comes in cold does
+    not expand."""
     narrow = load_case(
         "single_zone", FORCES | {"geometry.layer.plenum.height": "0.19 mm", "motion.through_flow": "local"}
     )
     flow = through_flow(narrow.motion, narrow.geometry, narrow.gas)
     assert flow is not None
     assert flow.velocity == check_case(narrow)["bed"]["gas_velocity"] > 1.5 * PORTS
+    cold = {f"geometry.inlet.{name}.temperature": "430 K" for name in ("tma", "purge")}
+    even = load_case("single_zone", FORCES | cold | {"energy": {}, "motion.through_flow": "local"})
+    expanded = through_flow(even.motion, even.geometry, even.gas)
+    assert expanded is not None
+    assert expanded.velocity == pytest.approx(PORTS * 473.0 / 430.0, rel=1e-3)
 
 
 def test_what_a_prescribed_flight_would_take() -> None:

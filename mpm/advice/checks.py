@@ -159,7 +159,7 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
     diffusivity = effective_diffusivity(
         molecular, material.porosity, material.tortuosity_factor[1], case.porous.diffusion
     )
-    velocity = rising_velocity(case.geometry, gas.mean_free_path, inlet.center)
+    velocity = rising_velocity(case.geometry, gas, inlet.center)
     surface = material.surface_to_volume
     numbers["species"] = species
     if k == 0.0 and not mechanism.is_first_order:
@@ -184,7 +184,7 @@ def _inlet(case: Case, inlet: Inlet) -> dict[str, Any]:
 
 def _bed(case: Case, layer: Layer) -> dict[str, Any]:
     gas, material, geometry = case.gas, layer.solid, case.geometry
-    rising = fastest_rise(geometry, gas.mean_free_path)
+    rising = fastest_rise(geometry, gas)
     permeability = material.slip_permeability(gas.mean_free_path)[1]
     numbers: dict[str, Any] = {
         "height": layer.height,

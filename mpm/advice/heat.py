@@ -155,7 +155,7 @@ def _exchange(case: Case, material: Material, diameter: float) -> tuple[float, f
     """Nu of the particles in the rising gas, and the time [s] in which they take its temperature through their outer surface."""
     gas = case.gas
     centres = [inlet.center for inlet in case.geometry.inlets]
-    rising = max((rising_velocity(case.geometry, gas.mean_free_path, x) for x in centres), default=0.0)
+    rising = max((rising_velocity(case.geometry, gas, x) for x in centres), default=0.0)
     nusselt = nusselt_of_particles(
         gas.viscosity * gas.heat_capacity / gas.conductivity,
         eng.reynolds(density=gas.density, velocity=rising, length=diameter, viscosity=gas.viscosity),

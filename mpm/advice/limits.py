@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
 
 SMEARED = 0.1
-"""Numerical over molecular diffusion along x that deserves a warning: 0.44 raised the coverage before the inlet by 0.008 in the zone, 0.19
-by 0.002 (docs/vibration.md)."""
+"""Numerical over molecular diffusion along x that deserves a warning; what it does to the coverage before the inlet is in
+docs/vibration.md."""
 CONTINUUM = 0.01
 """Knudsen number of the pores from which slip counts: it adds 8 Kn to the permeability (Klinkenberg 1941), 8 % here."""
 FEW = 10.0
@@ -104,7 +104,7 @@ def _courant(case: Case, report: dict[str, Any]) -> Iterator[str]:
 
 
 def _smearing(case: Case, report: dict[str, Any]) -> Iterator[str]:
-    """Columns so wide that upwinding diffuses."""
+    """Columns so wide that upwinding diffuses, which is a part of every scheme."""
     added, width = report["run"]["numerical_diffusion"], report["mesh"]["column_width"]
     if added > SMEARED and case.fidelity != "steady":
         otherwise = ", or fidelity averaged, which has no swinging gas" if case.fidelity == "resolved" else ""

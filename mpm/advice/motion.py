@@ -41,7 +41,7 @@ def motion_report(case: Case) -> dict[str, Any]:
             if s.stop > s.start
         ]
         numbers["rising_velocity"] = {
-            inlet.name: rising_velocity(case.geometry, case.gas.mean_free_path, inlet.center)
+            inlet.name: rising_velocity(case.geometry, case.gas, inlet.center)
             for inlet in case.geometry.inlets
             if inlet.side == "bottom"
         }
@@ -60,8 +60,8 @@ def force_rows(sheet: Sheet, motion: dict[str, Any], marked: Marked) -> None:
         sheet.add(key.replace("_", " "), marked.text(f"motion.{key}"), part=True)
     sheet.add(
         "gas rising through the bed",
-        f"{number(motion['through_velocity'] * 1e2, 'cm/s')}, which carries {percent(motion['gas_share'])} of its "
-        f"weight, {number(motion['weight'], 'Pa', 3)}",
+        f"{number(motion['through_velocity'] * 1e2, 'cm/s')}, which by its permeability carries "
+        f"{percent(motion['gas_share'])} of its weight, {number(motion['weight'], 'Pa', 3)}",
         part=True,
     )
     for name, velocity in motion["rising_velocity"].items():

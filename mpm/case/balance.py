@@ -50,7 +50,7 @@ def through_flow(motion: Motion, geometry: Geometry, gas: Gas) -> Throughflow | 
     velocity = motion.through_velocity if decides else None
     if velocity is None and ports is not None:
         local = decides and motion.through_flow == "local" and ports.velocity > 0.0
-        velocity = fastest_rise(geometry, gas.mean_free_path) if local else ports.velocity
+        velocity = fastest_rise(geometry, gas) if local else ports.velocity
     if velocity is None:
         return None
     if decides and motion.gas_column == "lab":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from mpm.case.gas import Gas
     from mpm.case.geometry import Geometry
+    from mpm.case.ports import Inlet
 
 
 class Throughflow(NamedTuple):
@@ -31,13 +32,18 @@ def total_throughflow(geometry: Geometry, gas: Gas) -> Throughflow | None:
         return None
     way, from_side = (-1.0, "top") if sides == {"bottom"} else (1.0, "bottom")
     shares = [
-        (inlet.width / geometry.length * gas.temperature / (inlet.temperature or gas.temperature), inlet)
+        (inlet.width / geometry.length * _expansion(inlet, gas.temperature), inlet)
         for inlet in geometry.inlets
         if inlet.side == from_side
     ]
     return Throughflow(
         way * sum(share * inlet.velocity for share, inlet in shares), sum(share for share, _ in shares)
     )
+
+
+def _expansion(inlet: Inlet, temperature: float) -> float:
+    """Volume of what an inlet blows, once it has the `temperature` of the gas [K], over that at its own."""
+    return temperature / (inlet.temperature or temperature)
 
 
 def flow_resistance(geometry: Geometry, free_path: float) -> float:
@@ -67,33 +73,37 @@ def spreading_length(geometry: Geometry, free_path: float) -> float:
     return math.inf
 
 
-def rising_velocity(geometry: Geometry, free_path: float, x: float) -> float:
-    """Estimated superficial velocity [m/s] at which gas enters the porous layers at position `x`.
+def rising_velocity(geometry: Geometry, gas: Gas, x: float) -> float:
+    """Estimated superficial velocity [m/s] at which gas enters the porous layers at position `x`, at gas.temperature.
 
     Sum over the bottom inlets of the response to a line source with decay length `spreading_length`, in a periodic
     or a closed strip; at most the fastest port velocity.
     """
-    length, decay = geometry.length, spreading_length(geometry, free_path)
-    inlets = [inlet for inlet in geometry.inlets if inlet.side == "bottom"]
-    fastest = max((inlet.velocity for inlet in inlets), default=0.0)
-    total = sum(inlet.velocity * inlet.width for inlet in inlets)
+    length, decay = geometry.length, spreading_length(geometry, gas.mean_free_path)
+    inlets = [
+        (inlet, inlet.velocity * _expansion(inlet, gas.temperature))
+        for inlet in geometry.inlets
+        if inlet.side == "bottom"
+    ]
+    fastest = max((speed for _, speed in inlets), default=0.0)
+    total = sum(speed * inlet.width for inlet, speed in inlets)
     if decay == 0.0:
         return fastest
     if decay > 1e3 * length:
         return min(fastest, total / length)
     velocity = 0.0
-    for inlet in inlets:
+    for inlet, speed in inlets:
         distance = abs(x - inlet.center)
         images, period = [distance, length - distance], length
         if not geometry.periodic:  # the walls mirror the inlet
             images = [distance, 2 * length - distance, x + inlet.center, 2 * length - x - inlet.center]
             period = 2 * length
         shape = sum(math.exp(-image / decay) for image in images) / -math.expm1(-period / decay)
-        velocity += inlet.velocity * inlet.width * shape / (2.0 * decay)
+        velocity += speed * inlet.width * shape / (2.0 * decay)
     return min(fastest, velocity)
 
 
-def fastest_rise(geometry: Geometry, free_path: float) -> float:
+def fastest_rise(geometry: Geometry, gas: Gas) -> float:
     """The largest `rising_velocity` [m/s] above an inlet."""
     below = (inlet.center for inlet in geometry.inlets if inlet.side == "bottom")
-    return max((rising_velocity(geometry, free_path, x) for x in below), default=0.0)
+    return max((rising_velocity(geometry, gas, x) for x in below), default=0.0)
