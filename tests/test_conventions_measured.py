@@ -195,13 +195,13 @@ def test_switches_of_the_coarsest_mesh_stand_in_only_where_verdicts_agree() -> N
 
 def test_table_states_both_conventions_and_both_meshes() -> None:
     """Fails when a row of the table loses a verdict, that at the thesis' columns, or does not own up to what was not measured."""
-    fine = {"mpm": {"R8": finding("in part, narrow", developed={})}}
+    fine = {"mpm": {"R8": finding("in part, narrow", developed={"time": [5.0, 8.0]})}}
     found = columns({"R8": finding("own")}, {"R8": finding("closed")}, fine=fine)
     (line,) = [line for line in table(found).splitlines() if line.startswith("| R8 ")]
     assert "**own**; at the thesis' columns: **in part, narrow**" in line
     assert "**closed**" in line
     lacking = missing_text(found)
-    assert "R8 at the thesis' columns, *mpm*: start-up." in lacking
+    assert "R8 at the thesis' columns, *mpm*: start-up, developed after 8.0 s of 20 s." in lacking
     assert "R8 at the thesis' columns, *closed code*: developed, start-up." in lacking
     assert ", ".join(name for name in ROWS if name != "R8") in lacking
 
@@ -244,7 +244,7 @@ def test_sweep_says_what_turns_a_row() -> None:
 
 
 def test_gain_is_read_as_far_as_both_runs_have_come() -> None:
-    """Fails when times before 5 s count, or a run that is still on its way is compared beyond its end."""
+    """Fails when times before 5 s count, a run that is still on its way is compared beyond its end, or at another time than the other."""
 
     def run(end: float, slope: float) -> Any:
         time = np.arange(0.0, end + 0.1, 0.5)
@@ -253,6 +253,9 @@ def test_gain_is_read_as_far_as_both_runs_have_come() -> None:
     times, gained = thesis_mesh.gain(run(20.0, 0.01), run(7.0, 0.02))
     assert times.tolist() == [5.0, 5.5, 6.0, 6.5, 7.0]
     assert gained == pytest.approx(0.01 * times)
+    stopped = run(7.0, 0.02)
+    stopped.history["time"][-1] = 6.8
+    assert thesis_mesh.gain(run(20.0, 0.01), stopped)[0].tolist() == [5.0, 5.5, 6.0, 6.5]
 
 
 def test_thesis_columns_are_on_the_thesis_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from reproduction import ROWS
 from reproduction.row import HOLDS
 from reproduction.settings import alone
-from reproduction.thesis_mesh import AT_THESIS_COLUMNS, STATES
+from reproduction.thesis_mesh import AT_THESIS_COLUMNS, END, STATES
 
 Found = dict[str, dict[str, Any]]
 """Findings by row."""
@@ -249,7 +249,13 @@ def missing_text(columns: Columns) -> str:
             lines.append(f"* *{NAMES[key]}*: {', '.join(rows)}.")
         fine = columns.fine.get(key, {})
         for name in AT_THESIS_COLUMNS:
-            lacking = [state for _, state in STATES if state not in fine.get(name, {}).get("numbers", {})]
+            numbers = fine.get(name, {}).get("numbers", {})
+            lacking = [state for _, state in STATES if state not in numbers]
+            lacking += [
+                f"{state} after {one['time'][-1]:.1f} s of {END}"
+                for state, one in numbers.items()
+                if one.get("time") and f"{one['time'][-1]:g} s" != END
+            ]
             if lacking:
                 lines.append(f"* {name} at the thesis' columns, *{NAMES[key]}*: {', '.join(lacking)}.")
     return "Not measured:\n\n" + "\n".join(lines) + "\n\n" if lines else ""

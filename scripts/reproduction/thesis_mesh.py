@@ -40,6 +40,9 @@ def gain(weak: Run, strong: Run) -> tuple[Floats, Floats]:
         times.append(run.history["time"][kept])
         boxes.append(run.history["titration.tma.box_mean"][kept])
     count = min(map(len, times))
+    apart = np.abs(times[0][:count] - times[1][:count]) > 1e-2
+    if apart.any():  # where a run was stopped between output times
+        count = int(np.argmax(apart))
     return times[0][:count], boxes[1][:count] - boxes[0][:count]
 
 
