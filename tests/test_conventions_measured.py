@@ -198,7 +198,7 @@ def test_table_states_both_conventions_and_both_meshes() -> None:
     fine = {"mpm": {"R8": finding("in part, narrow", developed={"time": [5.0, 8.0]})}}
     found = columns({"R8": finding("own")}, {"R8": finding("closed")}, fine=fine)
     (line,) = [line for line in table(found).splitlines() if line.startswith("| R8 ")]
-    assert "**own**; at the thesis' columns: **in part, narrow**" in line
+    assert "**own**; at the thesis' columns as far as measured: **in part, narrow**" in line
     assert "**closed**" in line
     lacking = missing_text(found)
     assert "R8 at the thesis' columns, *mpm*: start-up, developed after 8.0 s of 20 s." in lacking

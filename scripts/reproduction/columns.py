@@ -110,7 +110,8 @@ def _cells(found: dict[str, Any] | None, fine: dict[str, Any] | None) -> tuple[s
     measured, verdict = (found["measured"], f"**{found['verdict']}**") if found else ("", "not measured")
     if fine:
         measured += f"; at the thesis' columns: {fine['measured']}"
-        verdict += f"; at the thesis' columns: **{fine['verdict']}**"
+        so_far = " as far as measured" if unmeasured(fine["numbers"]) else ""
+        verdict += f"; at the thesis' columns{so_far}: **{fine['verdict']}**"
     return measured, verdict
 
 
@@ -240,6 +241,16 @@ def details(columns: Columns, coarse: Columns | None) -> str:
     return "".join(lines)
 
 
+def unmeasured(numbers: dict[str, Any]) -> list[str]:
+    """States of the thesis' columns that were not measured, or not to the end."""
+    lacking = [state for _, state in STATES if state not in numbers]
+    return lacking + [
+        f"{state} after {one['time'][-1]:.1f} s of {END}"
+        for state, one in numbers.items()
+        if one.get("time") and one["time"][-1] < float(END.removesuffix(" s")) - 0.1
+    ]
+
+
 def missing_text(columns: Columns) -> str:
     """What the document asks for and has not been measured."""
     lines = []
@@ -249,13 +260,7 @@ def missing_text(columns: Columns) -> str:
             lines.append(f"* *{NAMES[key]}*: {', '.join(rows)}.")
         fine = columns.fine.get(key, {})
         for name in AT_THESIS_COLUMNS:
-            numbers = fine.get(name, {}).get("numbers", {})
-            lacking = [state for _, state in STATES if state not in numbers]
-            lacking += [
-                f"{state} after {one['time'][-1]:.1f} s of {END}"
-                for state, one in numbers.items()
-                if one.get("time") and f"{one['time'][-1]:g} s" != END
-            ]
+            lacking = unmeasured(fine.get(name, {}).get("numbers", {}))
             if lacking:
                 lines.append(f"* {name} at the thesis' columns, *{NAMES[key]}*: {', '.join(lacking)}.")
     return "Not measured:\n\n" + "\n".join(lines) + "\n\n" if lines else ""
