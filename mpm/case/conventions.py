@@ -1,7 +1,8 @@
 """Conventions that codes for the same equations do not share: which switches of a case there are, and presets of them.
 
 Each switch is a key of its own, whose default is that of this model. `conventions = "closed-code"` puts the other values under those that a
-case types: those of the solver with which the thesis computed, as far as its manual and the equations printed in the thesis tell.
+case types: those of the solver with which the thesis computed, as far as manuals and the equations printed in the thesis tell, and where
+they do not a guess. docs/conventions.md says which is which.
 """
 
 from __future__ import annotations

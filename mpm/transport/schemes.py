@@ -4,7 +4,7 @@ Between two cell centres F = a C_behind - b C_ahead with a - b = u, the velocity
 (1/g is the sum of the half-cell resistances h / (2 D_eff)). With Pe = u/g:
 
     fitted     a = g B(-Pe), b = g B(Pe), B(z) = z/(exp z - 1): exact for a constant velocity (Scharfetter and Gummel 1969)
-    upwind     a = g + max(u, 0), b = g + max(-u, 0): first order, adds |u| h/2 to D_eff; what closed codes do unless told otherwise
+    upwind     a = g + max(u, 0), b = g + max(-u, 0): first order, adds |u| h/2 to D_eff; what older closed codes do untold
     central    a = g + u/2, b = g - u/2 where |Pe| <= 2, else a = max(u, 0), b = max(-u, 0): the hybrid scheme (Spalding 1972)
 
 Neither a nor b is ever negative, so that matrices are M-matrices: concentrations stay positive and within bounds in all three.
