@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpm.case.case import Case
+from mpm.case.case import Case, load_case
+from mpm.case.conventions import ADDED, CLOSED_CODE, SWITCHES, switches
 from mpm.flow.fields import FaceFlow, FlowField
 from mpm.flow.problem import CLOSED_PORTS, FlowProblem
 from mpm.flow.steady import steady_flow
@@ -550,3 +551,15 @@ def test_inlet_diffusion_by_the_other_schemes(velocity: str) -> None:
         by_hand = g + u if scheme == "upwind" else (g + 0.5 * u if u <= 2.0 * g else u)
         np.testing.assert_allclose(port.into / port.area, by_hand, rtol=1e-12)
         np.testing.assert_allclose((port.into - port.out) / port.area, u, atol=1e-12)
+
+
+def test_a_case_is_told_by_what_its_switches_are() -> None:
+    """Fails when the digest of a case without switches changes with them, does not tell two conventions apart, or takes the name of the
+    preset for a difference where all switches stand alike."""
+    own = load_case("single_zone")
+    typed = {key: value for key, value in switches(own).items() if key != "geometry.inlet_diffusion"}
+    assert own.with_(typed).content_hash() == own.content_hash()
+    assert typed == ADDED
+    others = [own.with_({key: CLOSED_CODE[key]}).content_hash() for key in SWITCHES]
+    assert len({own.content_hash(), *others}) == 1 + len(SWITCHES)
+    assert own.with_({"conventions": "closed-code"}).content_hash() == own.with_(CLOSED_CODE).content_hash()

@@ -20,6 +20,7 @@ from pydantic import PrivateAttr, ValidationError
 
 from mpm.case.cantera_file import cantera_site_density
 from mpm.case.chemistry import drop_heats
+from mpm.case.conventions import drop_own
 from mpm.case.kinds import CASE, read_input
 from mpm.case.messages import to_input_error
 from mpm.case.names import case_file
@@ -92,8 +93,10 @@ class Case(CaseTables):
         return write_toml(self.to_dict())
 
     def content_hash(self) -> str:
-        """Hexadecimal digest of everything that determines the results; a motion profile counts with its content."""
+        """Hexadecimal digest of everything that determines the results; a motion profile counts with its content, conventions where they
+        are not this model's."""
         content = self.to_dict()
+        drop_own(content)
         content["motion"]["profile"] = self.motion.profile_content
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

@@ -24,6 +24,15 @@ CLOSED_CODE: Mapping[str, Any] = {
 }
 """The switches by their dotted keys, with the values of the closed code."""
 SWITCHES = tuple(CLOSED_CODE)
+ADDED: Mapping[str, Any] = {
+    "transport.scheme": "fitted",
+    "transport.backflow_rows": 1,
+    "porous.diffusion": "effective",
+    "porous.inertia": "interstitial",
+    "porous.reaction_volume": "gas",
+    "motion.drag_reference": "pore",
+}
+"""Those that cases did not always have, with their defaults, under which a case is what it was without them."""
 PRESETS: Mapping[str, Mapping[str, Any]] = {"mpm": {}, "closed-code": CLOSED_CODE}
 
 
@@ -34,6 +43,18 @@ def preset_tables(name: Any) -> dict[str, dict[str, Any]]:
         table, _, last = key.partition(".")
         tables.setdefault(table, {})[last] = value
     return tables
+
+
+def drop_own(tables: dict[str, Any]) -> None:
+    """Take out of a resolved case what says no more than that its conventions are this model's, and the name of the preset: what counts is
+    how the switches stand."""
+    del tables["conventions"]
+    for key, value in ADDED.items():
+        table, _, last = key.partition(".")
+        if tables[table][last] == value:
+            del tables[table][last]
+    if not tables["porous"]:
+        del tables["porous"]
 
 
 def switches(case: CaseTables) -> dict[str, Any]:
