@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
 
 import reproduce  # noqa: E402
-from reproduction import ROWS, Lab, geometry, thesis_mesh  # noqa: E402
+from reproduction import ROWS, Lab, geometry, over_time, thesis_mesh  # noqa: E402
 from reproduction.columns import (  # noqa: E402
     Columns,
     Found,
@@ -201,8 +201,9 @@ def test_table_states_both_conventions_and_both_meshes() -> None:
     assert "**own**; at the thesis' columns as far as measured: **in part, narrow**" in line
     assert "**closed**" in line
     lacking = missing_text(found)
-    assert "R8 at the thesis' columns, *mpm*: start-up, developed after 8.0 s of 20 s." in lacking
-    assert "R8 at the thesis' columns, *closed code*: developed, start-up." in lacking
+    assert "R8 at the thesis' columns, *mpm*: start-up; developed, inlets in the lab's frame; " in lacking
+    assert "; developed after 8.0 s of 20 s." in lacking
+    assert "R6 at the thesis' columns, *closed code*: developed; start-up." in lacking
     assert ", ".join(name for name in ROWS if name != "R8") in lacking
 
 
@@ -243,19 +244,53 @@ def test_sweep_says_what_turns_a_row() -> None:
     )
 
 
-def test_gain_is_read_as_far_as_both_runs_have_come() -> None:
-    """Fails when times before 5 s count, a run that is still on its way is compared beyond its end, or at another time than the other."""
+def box_means(end: float, slope: float) -> Any:
+    """A run whose box mean grows steadily, with output twice a second."""
+    time = np.arange(0.0, end + 0.1, 0.5)
+    return SimpleNamespace(history={"time": time, "titration.tma.box_mean": slope * time})
 
-    def run(end: float, slope: float) -> Any:
-        time = np.arange(0.0, end + 0.1, 0.5)
-        return SimpleNamespace(history={"time": time, "titration.tma.box_mean": slope * time})
 
-    times, gained = thesis_mesh.gain(run(20.0, 0.01), run(7.0, 0.02))
-    assert times.tolist() == [5.0, 5.5, 6.0, 6.5, 7.0]
-    assert gained == pytest.approx(0.01 * times)
-    stopped = run(7.0, 0.02)
+def test_box_means_are_read_as_far_as_all_runs_have_come() -> None:
+    """Fails when a run that is still on its way is compared beyond its end, or at another time than the other."""
+    times, boxes = thesis_mesh.common([box_means(20.0, 0.01), box_means(7.0, 0.02)])
+    assert times.tolist() == np.arange(0.0, 7.1, 0.5).tolist()
+    assert boxes[1] - boxes[0] == pytest.approx(0.01 * times)
+    stopped = box_means(7.0, 0.02)
     stopped.history["time"][-1] = 6.8
-    assert thesis_mesh.gain(run(20.0, 0.01), stopped)[0].tolist() == [5.0, 5.5, 6.0, 6.5]
+    assert thesis_mesh.common([box_means(20.0, 0.01), stopped])[0][-1] == 6.5
+
+
+def test_gain_at_thesis_columns_is_judged_from_five_seconds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A gain of 0.01 per second that columns of 1 mm double: above its mesh error at no time, and not reproduced. One that they make half
+    again as large is above it at every time, by the criterion (least gain, largest mesh error) until 9 s alone. Fails when times before 5 s
+    are judged, the mesh error is another, the lab's frame is left out, or the stated times are not those."""
+
+    def measured(wide: float, end: float) -> dict[str, Any]:
+        def run(self: Lab, case: Any) -> Any:
+            share = 1.0 + (wide if case.geometry.cells < 40_000 else 0.0)
+            return box_means(end, 0.01 * share * (case.motion.gamma > 0.5) + 0.05)
+
+        monkeypatch.setattr(Lab, "run", run)
+        *_, last = thesis_mesh.growth(Lab(tmp_path, finest=True))
+        return {**finding(last.verdict), "numbers": last.numbers}
+
+    assert measured(1.1, 9.0)["verdict"] == "not reproduced"
+    assert measured(0.5, 9.0)["verdict"] == HOLDS
+    found = measured(0.5, 20.0)
+    assert found["verdict"] == "not reproduced"
+    assert list(found["numbers"]) == list(thesis_mesh.R8_STATES)
+    assert len(thesis_mesh.R8_STATES) == 4
+    one = found["numbers"]["start-up, inlets in the lab's frame"]
+    assert one["least gain from 5 s"] == pytest.approx(0.05)
+    assert one["largest mesh error from 5 s"] == pytest.approx(0.1)
+    assert over_time.above(one) == pytest.approx((5.0, 20.0, 0.025, 0.1))
+    assert over_time.full(one) == 20.0
+    assert over_time.at(one, 1.925) == "+0.0193 (0.0096)"
+    text = over_time.section(columns({}, {}, fine={"mpm": {"R8": found}}))
+    assert text.count("\n| mpm |") == 4
+    assert over_time.section(columns({}, {})) == ""
 
 
 def test_thesis_columns_are_on_the_thesis_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,7 +306,6 @@ def test_thesis_columns_are_on_the_thesis_mesh(tmp_path: Path, monkeypatch: pyte
             raise Stop
 
     monkeypatch.setattr(Lab, "run", note)
-    monkeypatch.setattr(thesis_mesh, "gain", lambda weak, strong: (np.array([5.0]), np.array([0.1])))
     for name, end in (("R6", 1.925), ("R8", 20.0)):
         asked.clear()
         with pytest.raises(Stop):

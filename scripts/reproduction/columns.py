@@ -8,7 +8,7 @@ from typing import Any
 from reproduction import ROWS
 from reproduction.row import HOLDS
 from reproduction.settings import alone
-from reproduction.thesis_mesh import AT_THESIS_COLUMNS, END, STATES
+from reproduction.thesis_mesh import AT_THESIS_COLUMNS, END, WANTED
 
 Found = dict[str, dict[str, Any]]
 """Findings by row."""
@@ -105,12 +105,12 @@ def counts(name: str, found: Found) -> str:
     )
 
 
-def _cells(found: dict[str, Any] | None, fine: dict[str, Any] | None) -> tuple[str, str]:
+def _cells(name: str, found: dict[str, Any] | None, fine: dict[str, Any] | None) -> tuple[str, str]:
     """Measured and verdict of a row in a column, at the thesis' columns too where that was measured."""
     measured, verdict = (found["measured"], f"**{found['verdict']}**") if found else ("", "not measured")
     if fine:
         measured += f"; at the thesis' columns: {fine['measured']}"
-        so_far = " as far as measured" if unmeasured(fine["numbers"]) else ""
+        so_far = " as far as measured" if unmeasured(name, fine["numbers"]) else ""
         verdict += f"; at the thesis' columns{so_far}: **{fine['verdict']}**"
     return measured, verdict
 
@@ -134,7 +134,7 @@ def table(columns: Columns) -> str:
     for name, row in ROWS.items():
         cells = [name, row.figure, row.statement, row.expected]
         for key, found in columns.both.items():
-            cells += _cells(found.get(name), columns.fine.get(key, {}).get(name))
+            cells += _cells(name, found.get(name), columns.fine.get(key, {}).get(name))
         cells += [_used(columns, name), f"`scripts/reproduce.py {name}`"]
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     summary = " ".join(counts(name, found) for name, found in columns.both.items() if found)
@@ -241,9 +241,9 @@ def details(columns: Columns, coarse: Columns | None) -> str:
     return "".join(lines)
 
 
-def unmeasured(numbers: dict[str, Any]) -> list[str]:
-    """States of the thesis' columns that were not measured, or not to the end."""
-    lacking = [state for _, state in STATES if state not in numbers]
+def unmeasured(name: str, numbers: dict[str, Any]) -> list[str]:
+    """States of a row at the thesis' columns that were not measured, or not to the end."""
+    lacking = [state for state in WANTED[name] if state not in numbers]
     return lacking + [
         f"{state} after {one['time'][-1]:.1f} s of {END}"
         for state, one in numbers.items()
@@ -260,7 +260,7 @@ def missing_text(columns: Columns) -> str:
             lines.append(f"* *{NAMES[key]}*: {', '.join(rows)}.")
         fine = columns.fine.get(key, {})
         for name in AT_THESIS_COLUMNS:
-            lacking = unmeasured(fine.get(name, {}).get("numbers", {}))
+            lacking = unmeasured(name, fine.get(name, {}).get("numbers", {}))
             if lacking:
-                lines.append(f"* {name} at the thesis' columns, *{NAMES[key]}*: {', '.join(lacking)}.")
+                lines.append(f"* {name} at the thesis' columns, *{NAMES[key]}*: {'; '.join(lacking)}.")
     return "Not measured:\n\n" + "\n".join(lines) + "\n\n" if lines else ""

@@ -8,7 +8,7 @@ from pathlib import Path
 from meshes import MESHES
 from mpm.case.conventions import conventions_of
 from mpm.files import write_atomically
-from reproduction import ROWS
+from reproduction import ROWS, over_time
 from reproduction.columns import Columns, Found, missing_text, strays, table, turns_text
 from reproduction.geometry import POINTS, ROW_NAMES, section, settings
 from reproduction.row import HOLDS
@@ -137,7 +137,13 @@ def write_report(lab: Lab, pictures: bool, document: Path = DOCUMENT) -> None:
     points = settings()
     sweep = {name: found_by(lab, points[name], ROW_NAMES) for name in POINTS}
     text = INTRODUCTION + meshes_text() + table(columns) + strays(columns, sweep) + missing_text(columns)
-    text += turns_text(columns, coarse) + section(sweep) + CRITERIA + paragraphs(columns.mpm)
+    text += (
+        over_time.section(columns)
+        + turns_text(columns, coarse)
+        + section(sweep)
+        + CRITERIA
+        + paragraphs(columns.mpm)
+    )
     text += "## Pictures\n\n"
     for name, (_, caption) in {**STREAMS, **PICTURES}.items():
         file = next((f for f in (f"{name}.png", f"{name}.gif") if (figures / f).exists()), None)
