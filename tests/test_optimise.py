@@ -12,7 +12,7 @@ import pytest
 from mpm.advice.doses import doses_of
 from mpm.case.case import load_case
 from mpm.cli import main
-from mpm.cli.searchover import print_over
+from mpm.cli.searchover import print_over, variants
 from mpm.cli.searchscreen import print_point
 from mpm.errors import ConvergenceError, InputError
 from mpm.optimise import Point, Search, optimise
@@ -134,6 +134,43 @@ def test_a_search_over_nonsense_is_one_line(
     )
     assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("over", "settings", "why"),
+    [
+        ("motion.gamma=0.3,0.45", [], "mean velocity, not the cycle"),
+        ("motion.friction=0.4,0.5", [], "motion.profile is not force_balance"),
+        ("motion.bed_velocity=1 cm/s,2 cm/s", ["motion.profile=force_balance"], "forces decide"),
+        ("geometry.inlet.tma.start=0 s,5 s", [], "of dose windows"),
+        ("time.end=5 s,10 s", [], "a steady state has no time"),
+        ("gas.conductivity=0.03 W/m/K,0.04 W/m/K", [], "temperature is one number"),
+    ],
+)
+def test_a_search_over_a_key_that_nothing_reads_is_refused(
+    over: str, settings: list[str], why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fails when values that all give the same steady states are searched one by one, as if they told something; the default among them is
+    one of them."""
+    arguments = ["optimise", str(CASES / "single_zone.toml"), "-o", str(tmp_path / "new"), "--over", over]
+    assert main([*arguments, *(part for one in settings for part in ("--set", one))]) == 2
+    (told,) = capsys.readouterr().err.strip().splitlines()
+    assert over.partition("=")[0] in told and why in told
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_key_that_is_read_is_searched() -> None:
+    """Fails when a value that is the default, or says that nothing vibrates, passes for one that has no effect."""
+    case = load_case(CASES / "single_zone.toml", {"motion.profile": "force_balance"})
+    for over in (
+        "motion.friction=0.3,0.4,0.5",
+        "motion.gamma=0,0.3",
+        "gas.pressure=1 bar,626 torr",
+        "transport.vibrational_dispersion=false,true",
+        "conventions=mpm,closed-code",
+    ):
+        key, cases = variants(case, over, velocities=False)
+        assert key == over.partition("=")[0] and len(cases) == over.count(",") + 1
 
 
 def test_numbers_that_no_search_takes_are_told_once_over_all_values(

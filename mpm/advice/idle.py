@@ -28,7 +28,18 @@ _ISOTHERMAL = "temperature is one number, gas.temperature"
 
 def idle_keys(case: Case) -> list[str]:
     """Sentences `key, key: why they have no effect`, one for each reason."""
-    reasons: dict[str, list[str]] = {}
+    return [f"{', '.join(keys)}: {why}" for why, keys in reasons(case).items()]
+
+
+def reason(case: Case, key: str) -> str | None:
+    """Why what a case has under `key`, or under a table that holds it, has no effect; None where it has, or is the default."""
+    keys = [key, *(key[:i] for i, c in enumerate(key) if c == ".")]
+    return next((why for why, idle in reasons(case).items() if any(one in idle for one in keys)), None)
+
+
+def reasons(case: Case) -> dict[str, list[str]]:
+    """The keys without effect, by the reason."""
+    found: dict[str, dict[str, None]] = {}
     for key, why in (
         *_of_motion(case),
         *_of_time(case),
@@ -39,8 +50,8 @@ def idle_keys(case: Case) -> list[str]:
         *_of_entropies(case),
         *_of_mechanism(case),
     ):
-        reasons.setdefault(why, []).append(key)
-    return [f"{', '.join(dict.fromkeys(keys))}: {why}" for why, keys in reasons.items()]
+        found.setdefault(why, {})[key] = None
+    return {why: list(keys) for why, keys in found.items()}
 
 
 Idle = Iterator[tuple[str, str]]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mpm.advice.idle import reason
 from mpm.case.settings import parse_settings
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
@@ -36,7 +37,7 @@ class Variant:
 
 def variants(case: Case, over: str, velocities: bool) -> tuple[str, list[Variant]]:
     """The key, and the case at each value. Raises InputError for what is no such list, for a dose, which the search chooses itself (port
-    velocities too with `velocities`), and where a case is refused."""
+    velocities too with `velocities`), for a key that steady states of the case do not read, and where a case is refused."""
     key, equals, values = over.partition("=")
     texts = [text.strip() for text in values.split(",")]
     if not equals or not key.strip() or not all(texts) or len(set(texts)) < len(texts):
@@ -49,7 +50,21 @@ def variants(case: Case, over: str, velocities: bool) -> tuple[str, list[Variant
     for text in texts:
         settings: dict[str, Any] = parse_settings([f"{key}={text}"])
         found.append(Variant(text=text, case=case.with_(settings)))
+    why = _unread(key.strip(), found)
+    if why:
+        raise InputError.at(
+            "--over", "", f"{key.strip()}, which has no effect here ({why})", "a key that has", given=""
+        )
     return key.strip(), found
+
+
+def _unread(key: str, cases: list[Variant]) -> str | None:
+    """Why the steady states that are searched are the same at all values of a key; None where two values or more may count.
+
+    The default says nothing (`mpm.advice.idle`) and so has no reason, but only one value can be that.
+    """
+    found = [reason(one.case.with_({"fidelity": "steady"}), key) for one in cases]
+    return next((why for why in found if why), None) if found.count(None) < 2 else None
 
 
 def _chosen(case: Case, velocities: bool) -> set[str]:
