@@ -206,6 +206,44 @@ def test_the_cycle_is_one_piece(acting: BedForces) -> None:
         assert low <= force <= high
 
 
+@pytest.mark.parametrize("make", [forces, block])
+@pytest.mark.parametrize("gamma", [0.3, 0.45, 0.95, 2.0])
+@pytest.mark.parametrize("friction", [0.01, 0.1, 0.3, 1.0])
+def test_speed_that_is_looked_for_is_that_which_is_come_to(
+    make: Any, gamma: float, friction: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The cycle by bisection and that after 4,000 cycles (friction 0.01) to 10, to 1e-10 of the base's speed. Fails when the one looked for
+    is another, has other stretches, or begins otherwise than it ends."""
+    monkeypatch.setattr("mpm.physics.bed_cycle.PATIENCE", 1)
+    acting = make(gamma, friction=friction)
+    cycle, peak = bed_cycle(acting), acting.ax * acting.omega
+    assert cycle.mean == pytest.approx(
+        mean_speed(acting, skip=int(40 / friction), cycles=1), abs=1e-10 * peak
+    )
+    monkeypatch.setattr("mpm.physics.bed_cycle.PATIENCE", 2000)
+    marched = bed_cycle(acting)
+    assert np.ravel(cycle.flights) == pytest.approx(np.ravel(marched.flights), abs=1e-10)
+    assert cycle.contact_range == pytest.approx(marched.contact_range, rel=1e-12)
+    assert cycle.velocity(TURN) == pytest.approx(cycle.velocity(0.0), abs=1e-10 * peak)
+    for phase in np.linspace(0.001, TURN, 40):
+        assert cycle.velocity(phase) == pytest.approx(marched.velocity(phase), abs=1e-9 * peak)
+
+
+@pytest.mark.parametrize("friction", [1e-3, 1e-4, 1e-6])
+@pytest.mark.parametrize("lag", [-0.05, 0.0, 0.05])
+def test_a_bed_that_hardly_rubs(friction: float, lag: float) -> None:
+    """Friction that tends to nothing leaves the bed at the speed at which its base pulls it forward as long and hard as back. Where they
+    meet, at phases +-p, speed is A w cos p, and with N = c + a sin + b cos the pulls are alike at p + (b/c) sin p = pi/2; the next term is
+    of the order of friction. Fails when a bed with little friction is refused, or creeps at another speed."""
+    acting = forces(0.2, friction=friction, lag=lag)
+    contact, peak = acting.contact, acting.ax * acting.omega
+    p = brentq(lambda p: p + contact.b / contact.c * math.sin(p) - 0.5 * math.pi, 0.0, math.pi)
+    cycle = bed_cycle(acting)
+    assert set(kinds(cycle)) == {"slide"}
+    assert cycle.mean == pytest.approx(peak * math.cos(p), abs=5.0 * friction * peak)
+    assert (abs(cycle.mean) > 0.1 * peak) == (lag != 0.0)
+
+
 def test_beds_that_repeat_no_cycle() -> None:
     """Fails when a bed that gas carries, or one that hops over cycles, gets a cycle."""
     with pytest.raises(Carried):

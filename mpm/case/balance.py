@@ -103,7 +103,7 @@ def complete_motion(motion: Motion, geometry: Geometry, gas: Gas) -> None:
         ) from None
     except NoCycle:
         raise reject(
-            f"force_balance at gamma = {motion.gamma:g}, friction {motion.friction:g}: no cycle of the bed is like the one before",
-            "a smaller gamma, more friction, or another profile",
+            f"force_balance at gamma = {motion.gamma:g}: no cycle of the bed is like the one before",
+            "a smaller gamma, or another profile",
             key="motion.profile",
         ) from None

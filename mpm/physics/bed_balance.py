@@ -172,7 +172,7 @@ def at_rest(forces: BedForces) -> Stretch:
     """The bed at phase 0, where it moves with the base: how a calculation begins. Raises Carried where gas carries it."""
     if forces.is_carried:
         raise Carried("gas carries the weight")
-    return _in_contact(forces, 0.0, forces.base_speed(0.0))
+    return in_contact(forces, 0.0, forces.base_speed(0.0))
 
 
 def successor(stretch: Stretch) -> Stretch:
@@ -182,15 +182,15 @@ def successor(stretch: Stretch) -> Stretch:
     if stretch.kind == "flight":
         base, catch = forces.base_speed(phase), forces.friction * abs(stretch.landing)
         speed = base if abs(base - speed) <= catch else speed + math.copysign(catch, base - speed)
-        return _in_contact(forces, phase, speed)
+        return in_contact(forces, phase, speed)
     if stretch.thrown:
         return _flying(forces, phase, speed)
     if stretch.kind == "stick":
         return _sliding(forces, phase, speed, stretch.way)
-    return _in_contact(forces, phase, forces.base_speed(phase))
+    return in_contact(forces, phase, forces.base_speed(phase))
 
 
-def _in_contact(forces: BedForces, phase: float, speed: float) -> Stretch:
+def in_contact(forces: BedForces, phase: float, speed: float) -> Stretch:
     """The bed on the base with velocity `speed`: thrown again at once, riding along or sliding."""
     if forces.held.negative(phase):
         return _flying(forces, phase, speed)

@@ -7,11 +7,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from mpm.constants import TURN
-from mpm.physics.bed_balance import Kind, Stretch, at_rest, successor
+from mpm.physics.bed_balance import Kind, Stretch, at_rest, in_contact, successor
 from mpm.physics.bed_forces import BedForces
+from mpm.physics.waves import root
 
 CYCLES = 2000
-"""Cycles within which a bed comes to repeat itself, or does not: friction wears a difference off in far fewer."""
+"""Cycles within which a bed comes to rise and fall alike in each, or does not."""
+PATIENCE = 200
+"""Cycles after which the speed that it repeats is looked for, where friction is too small to have brought it there."""
 REPEATS = 1e-12
 """Change from one cycle to the next, relative to the base's own velocity and amplitude, below which they are one."""
 MOST_STRETCHES = 200
@@ -112,32 +115,56 @@ def bed_cycle(forces: BedForces) -> BedCycle:
     """The cycle that the bed comes to repeat, from being carried along at phase 0.
 
     Raises Carried where gas takes the bed away, NoCycle where no cycle is like the one before (a bed thrown high without gas, whose
-    flights last longer than cycles), or where friction is so small that the bed comes to its pace in more than CYCLES.
+    flights last longer than cycles).
     """
     speed, height = max(forces.ax, forces.ay) * forces.omega, forces.ay
     before: tuple[float, float, float] | None = None
-    for segments, end in itertools.islice(_cycles(forces), CYCLES):
+    for number, (segments, end) in enumerate(itertools.islice(_cycles(at_rest(forces)), CYCLES)):
         now = (
             (end.velocity(0.0) / speed, end.rising(0.0) / speed, end.height(0.0) / height)
             if speed
             else (0.0,) * 3
         )
-        if before is not None and all(abs(a - b) <= REPEATS for a, b in zip(now, before, strict=True)):
-            return BedCycle(forces, segments)
+        if before is not None:
+            along, *vertical = (abs(a - b) <= REPEATS for a, b in zip(now, before, strict=True))
+            if along and all(vertical):
+                return BedCycle(forces, segments)
+            if number >= PATIENCE and all(vertical):
+                return _repeated(end)
         before = now
     raise NoCycle(f"no cycle like the one before in {CYCLES}")
 
 
+def _repeated(start: Stretch) -> BedCycle:
+    """The cycle at whose end the bed is as fast as at its beginning; it begins with `start` at phase 0, at another speed.
+
+    Rise and fall do not depend on the speed. Of two beds the one that is faster at first is never the slower one afterwards, and friction
+    brings them together: what a cycle adds falls with the speed that it begins with. One faster than the base ever is loses, one slower
+    gains, so that one speed between is repeated. Found by bisection it needs some 60 cycles, however small friction is.
+    """
+    forces = start.forces
+
+    def cycle(speed: float) -> tuple[tuple[Segment, ...], Stretch]:
+        flies = start.kind == "flight"
+        return next(_cycles(replace(start, speed=speed) if flies else in_contact(forces, 0.0, speed)))
+
+    def added(speed: float) -> float:
+        return cycle(speed)[1].velocity(0.0) - speed
+
+    peak = forces.ax * forces.omega
+    segments, _ = cycle(root(added, -peak, peak))
+    return BedCycle(forces, segments)
+
+
 def mean_speed(forces: BedForces, *, skip: int, cycles: int) -> float:
     """Mean conveying velocity [m/s] over so many cycles after the first `skip`, whether they are alike or not."""
-    some = itertools.islice(_cycles(forces), skip, skip + cycles)
+    some = itertools.islice(_cycles(at_rest(forces)), skip, skip + cycles)
     way = sum(BedCycle(forces, segments).distance(TURN) for segments, _ in some)
     return way * forces.omega / (cycles * TURN)
 
 
-def _cycles(forces: BedForces) -> Iterator[tuple[tuple[Segment, ...], Stretch]]:
-    """Cycle after cycle from phase 0 on: its segments, and the stretch under way at its end, counted from the next one."""
-    stretch = at_rest(forces)
+def _cycles(stretch: Stretch) -> Iterator[tuple[tuple[Segment, ...], Stretch]]:
+    """Cycle after cycle from the stretch at phase 0 on: its segments, and the stretch under way at its end, counted from the next one."""
     while True:
         segments, start = [], 0.0
         while stretch.end < TURN:
