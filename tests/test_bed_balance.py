@@ -46,14 +46,18 @@ def kinds(cycle: BedCycle) -> list[str]:
 def test_figures_of_the_base_bed() -> None:
     """Fails when the flight at Gamma 0.45, the gaps or the weight are not those integrated without mpm.
 
-    Landing is 153.8854 deg here and by `solve_ivp` (below); the figure handed down, 153.8867 deg, is 0.0013 deg off, why is not known.
+    Landing is 153.8854 deg here and by `solve_ivp` (below). The figure handed down, 153.8867 deg, is what any integration from lift-off in
+    steps of 1/100,000 or 1/50,000 of a cycle (0.0036 or 0.0072 deg) finds that takes the end of the last step for the landing.
     """
     cycle = bed_cycle(forces(0.45))
     ((liftoff, landing),) = cycle.flights
     assert cycle.forces.gas_share == pytest.approx(0.6125, abs=2e-5)
     assert cycle.forces.weight == pytest.approx(39.7, abs=0.05)
     assert math.degrees(liftoff) == pytest.approx(59.4443, abs=5e-5)
-    assert math.degrees(landing) == pytest.approx(153.8867, abs=2e-3)
+    assert math.degrees(landing) == pytest.approx(153.8854, abs=5e-5)
+    for step in (TURN / 100_000, TURN / 50_000):
+        end_of_step = liftoff + math.ceil((landing - liftoff) / step) * step
+        assert math.degrees(end_of_step) == pytest.approx(153.8867, abs=5e-5)
     assert cycle.largest_gap == pytest.approx(1.4354e-6, abs=5e-11)
     assert kinds(cycle) == ["stick", "slide", "flight", "slide", "stick"]
     assert bed_cycle(forces(0.30)).flights == () and bed_cycle(forces(0.30)).largest_gap == 0.0
