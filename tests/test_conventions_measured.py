@@ -287,6 +287,10 @@ def test_gain_at_thesis_columns_is_judged_from_five_seconds(
     assert one["largest mesh error from 5 s"] == pytest.approx(0.1)
     assert over_time.above(one) == pytest.approx((5.0, 20.0, 0.025, 0.1))
     assert over_time.full(one) == 20.0
+    assert over_time.gains_until(one) == 20.0
+    ended = {**one, "gain": [0.0 if time in (7.0, 11.0) else 0.1 for time in one["time"]]}
+    assert over_time.gains_until(ended) == 6.5
+    assert over_time.gains_until({**ended, "gain": [9e-5] * len(one["time"])}) is None
     assert over_time.at(one, 1.925) == "+0.0193 (0.0096)"
     text = over_time.section(columns({}, {}, fine={"mpm": {"R8": found}}))
     assert text.count("\n| mpm |") == 4
