@@ -67,32 +67,36 @@ class Scatter:
     def __init__(self, comm: MPI.Comm, places: NDArray[np.integer], size: int):
         self.comm, self.places, self.size = comm, np.asarray(places, dtype=np.int64), size
         self.counts = np.asarray(comm.allgather(len(self.places)))
-        self.all_places = np.concatenate(comm.allgather(self.places)) if size else np.empty(0, np.int64)
+        all_places = np.concatenate(comm.allgather(self.places)) if size else np.empty(0, np.int64)
+        # of each position the place of its value where those of the ranks follow one another
+        self._order = np.argsort(all_places)
 
     def to_all(self, local: Floats) -> Floats:
         """The global array on every rank; `local` has shape (..., n) with n own values."""
-        local = np.asarray(local, dtype=np.float64)
-        lead = local.shape[:-1]
-        width = int(np.prod(lead, dtype=np.int64))
-        send = np.ascontiguousarray(local.reshape(width, local.shape[-1]).T)
-        received = np.empty((self.size, width))
+        send, width = self._sent(local)
+        received = np.empty(self.size * width)
         self.comm.Allgatherv(send, [received, self.counts * width])
-        return self._ordered(received, lead)
+        return self._ordered(received, np.shape(local)[:-1], width)
 
     def to_root(self, local: Floats) -> Floats | None:
         """The global array on rank 0, None elsewhere."""
-        local = np.asarray(local, dtype=np.float64)
-        lead = local.shape[:-1]
-        width = int(np.prod(lead, dtype=np.int64))
-        send = np.ascontiguousarray(local.reshape(width, local.shape[-1]).T)
-        received = np.empty((self.size, width)) if is_root(self.comm) else None
+        send, width = self._sent(local)
+        received = np.empty(self.size * width) if is_root(self.comm) else None
         self.comm.Gatherv(send, None if received is None else [received, self.counts * width], root=0)
-        return None if received is None else self._ordered(received, lead)
+        return None if received is None else self._ordered(received, np.shape(local)[:-1], width)
 
-    def _ordered(self, received: Floats, lead: tuple[int, ...]) -> Floats:
-        ordered = np.empty_like(received)
-        ordered[self.all_places] = received
-        return np.ascontiguousarray(ordered.T).reshape(*lead, self.size)
+    @staticmethod
+    def _sent(local: Floats) -> tuple[Floats, int]:
+        """What a rank sends, and how many arrays of its values that is."""
+        send = np.ascontiguousarray(local, dtype=np.float64)
+        return send, int(np.prod(send.shape[:-1], dtype=np.int64))
+
+    def _ordered(self, received: Floats, lead: tuple[int, ...], width: int) -> Floats:
+        """Array by array in the grid's order: rows of values stay rows, which is many times as fast as turning them about."""
+        blocks = np.split(received, np.cumsum(self.counts * width)[:-1])
+        by_rank = [block.reshape(width, n) for block, n in zip(blocks, self.counts, strict=True)]
+        whole = by_rank[0] if len(by_rank) == 1 else np.concatenate(by_rank, axis=1)
+        return np.take(whole, self._order, axis=1).reshape(*lead, self.size)
 
     def to_local(self, whole: Floats) -> Floats:
         """This rank's values of a global array that every rank has, shape (..., size)."""

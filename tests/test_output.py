@@ -19,7 +19,7 @@ from mpm.errors import ConvergenceError, InputError, MpmError
 from mpm.files import write_atomically
 from mpm.mesh.grid import Grid
 from mpm.output.directory import RunDirectory
-from mpm.output.vtu import Packer, read_pvd, read_vtu
+from mpm.output.vtu import Packer, encode_vtu, grid_quads, read_pvd, read_vtu
 
 COLUMNS, ROWS = 12, 5
 
@@ -136,6 +136,32 @@ def test_what_changes_under_a_known_name_is_written_anew() -> None:
     assert packer.block("C_TMA", b"one" * 100) is first
     assert packer.block("C_TMA", b"two" * 100) != first
     assert packer.block("C_TMA", b"one" * 100) == first
+
+
+@pytest.mark.parametrize("kind", ["nothing", "zeros", "noise", "ramp", "field"])
+@pytest.mark.parametrize("lasting", [False, True])
+def test_any_reader_of_zlib_finds_what_was_packed(kind: str, lasting: bool) -> None:
+    """Fails when a block, written by whatever is fastest here, is no zlib stream of the raw bytes, or other bytes the second time."""
+    rng = np.random.default_rng(7)
+    wave = np.sin(np.linspace(0.0, 30.0, 50_000)) * np.exp(-np.linspace(0.0, 200.0, 50_000))
+    raw = {
+        "nothing": b"",
+        "zeros": bytes(1_200_000),
+        "noise": rng.bytes(1_200_000),
+        "ramp": np.arange(300_000, dtype=np.int32).tobytes(),
+        "field": wave.astype(np.float32).tobytes(),
+    }[kind]
+    block = Packer().block("C_TMA", raw, lasting)
+    assert list(np.frombuffer(block, "<u8", 4)) == [1, len(raw), 0, len(block) - 32]
+    assert zlib.decompress(block[32:]) == raw
+    assert Packer().block("C_TMA", raw, lasting) == block
+
+
+def test_numbers_of_a_grid_do_not_swell_the_files() -> None:
+    """Fails when what the fast compressor writes of corners and offsets, half as much again as zlib, goes into every file."""
+    quads = grid_quads(411, 121)
+    content = encode_vtu(np.zeros((412 * 122, 3)), quads, {}, 0.0)
+    assert len(content) < 1.05 * (len(zlib.compress(quads.tobytes(), 1)) + 60_000)
 
 
 def test_wrong_shape_is_refused(run: RunDirectory, grid: Grid) -> None:

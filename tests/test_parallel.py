@@ -124,3 +124,20 @@ def test_gathers_of_uneven_and_empty_shares() -> None:
     assert (root is None) == (COMM.rank != 0)
     nothing = Scatter(COMM, np.empty(0, np.int64), 0)
     assert nothing.to_all(np.empty((3, 0))).shape == (3, 0)
+
+
+@pytest.mark.parametrize("lead", [(), (1,), (4,), (3, 2), (0,)])
+def test_gathers_of_any_order_and_shape(lead: tuple[int, ...]) -> None:
+    """Fails when values of cells that lie in any order, on any rank, do not come to their places, or arrays of them are mixed up."""
+    size = 23
+    order = np.random.default_rng(3).permutation(size)
+    owner = np.random.default_rng(4).integers(COMM.size, size=size)
+    scatter = Scatter(COMM, order[owner == COMM.rank], size)
+    whole = np.random.default_rng(5).random((*lead, size))
+    local = scatter.to_local(whole)
+    np.testing.assert_array_equal(scatter.to_all(local), whole)
+    root = scatter.to_root(np.asfortranarray(local))
+    if COMM.rank == 0:
+        np.testing.assert_array_equal(root, whole)
+    else:
+        assert root is None
