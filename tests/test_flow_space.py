@@ -120,7 +120,7 @@ def test_convection_is_that_of_the_finite_elements(changes: dict[str, Any], infl
     change = swirling(space, inflow=0.0, turn=0.9)
     slope.mult(change.x.petsc_vec, expected)
     scale = largest(COMM, [np.abs(expected.array).max()])[0]
-    found = convection.slope(field.x.array, change.x.array).array[: space.own]
+    found = convection.slopes(field.x.array)(change.x.array).array[: space.own]
     np.testing.assert_allclose(found, expected.array, rtol=0.0, atol=1e-12 * scale)
 
     entries = convection.slope_matrix(field.x.array)

@@ -22,8 +22,8 @@ class Jacobian:
     def __init__(
         self, space: FlowSpace, creeping: PETSc.Mat, convection: Convection, values: Floats, share: float
     ):
-        self.space, self.creeping, self.convection = space, creeping, convection
-        self.values, self.share = values, share
+        self.space, self.creeping, self.share = space, creeping, share
+        self.slope = convection.slopes(values)
         self._change, self._force = space.function(), creeping.createVecLeft()
 
     def mult(self, _: PETSc.Mat, psi: PETSc.Vec, result: PETSc.Vec) -> None:
@@ -32,7 +32,7 @@ class Jacobian:
         self.space.curl.mult(psi, change.x.petsc_vec)
         change.x.scatter_forward()
         self.creeping.mult(change.x.petsc_vec, force)
-        slope = self.convection.slope(self.values, change.x.array)
+        slope = self.slope(change.x.array)
         force.array[:] += self.share * slope.array[: self.space.own]
         self.space.curl.multTranspose(force, result)
 

@@ -14,7 +14,7 @@ from mpm.flow.cycle import mean_motion, periodic_flow
 from mpm.flow.factors import STEADY
 from mpm.flow.fields import FlowField, mean_field
 from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
-from mpm.flow.steady import CONVERGED, steady_flow
+from mpm.flow.steady import steady_flow
 from mpm.mesh.strip import Strip
 from mpm.motion.kinematics import REST, BedMotion, StepMotion, step_motion
 from mpm.motion.schedule import RESTING, Schedule, Step
@@ -80,12 +80,12 @@ class CyclicFlow:
         A guess without a field at rest asks for none. Raises ConvergenceError.
         """
         case, at_rest, last = problem.case, None, None if guess is None else guess.phases[-1]
-        converged = CONVERGED if guess is None else FOLLOWED
+        enough = 0.0 if guess is None else FOLLOWED
         if begins_at_rest(case, schedule) and (guess is None or guess.at_rest is not None):
-            at_rest = steady_flow(problem, REST, None if guess is None else guess.at_rest, converged)
+            at_rest = steady_flow(problem, REST, None if guess is None else guess.at_rest, enough)
         if case.fidelity == "resolved":
             return cls(at_rest, periodic_flow(problem, bed_motion, schedule.phases, watch, last, STEADY))
-        return cls(at_rest, [steady_flow(problem, mean_motion(bed_motion), last, converged)])
+        return cls(at_rest, [steady_flow(problem, mean_motion(bed_motion), last, enough)])
 
     def at(self, step: Step) -> FlowField:
         """The field of the step's phase."""

@@ -10,10 +10,13 @@ import numpy as np
 
 from mpm.errors import ConvergenceError
 from mpm.flow.fields import FlowField
-from mpm.flow.problem import FlowProblem
+from mpm.flow.problem import NEWTON_TOLERANCE, FlowProblem
 from mpm.motion.kinematics import REST, StepMotion
 
-CONVERGED = 1e-8  # last change of a velocity, relative to the fastest; the next one would be smaller by 1e-4 or better
+CONVERGED = 1e-10  # what is left to change of a velocity, relative to the fastest
+# tolerance of the linear solves on the way there: what they leave the next step finds. One that has enough after a step or two takes the
+# finer one of `FlowProblem.newton_update`
+INNER = 1e-3
 # change that is accepted once it no longer shrinks: what rounding of the pressure leaves, 1e-8 where a powder of a micron holds back 1 bar
 ROUNDING = 1e-5
 LIMIT = 15  # Newton steps from a creeping flow
@@ -25,9 +28,9 @@ def steady_flow(
     problem: FlowProblem,
     motion: StepMotion = REST,
     guess: FlowField | None = None,
-    converged: float = CONVERGED,
+    enough: float = 0.0,
 ) -> FlowField:
-    """Steady flow with convection under constant forcing; leaves it in `problem`.
+    """Steady flow with convection under constant forcing; leaves it in `problem`. A last change of velocities below `enough` will do.
 
     Newton's method from a `guess` with the same ports, or from the creeping flow, with the factored creeping operator as preconditioner, so
     that one factor serves. Where that does not arrive (ports at a Reynolds number of a hundred), the convection grows in steps. Raises
@@ -38,7 +41,7 @@ def steady_flow(
     else:
         problem.start_from(guess, (1.0, motion.frame_velocity_y))
     try:
-        _newton(problem, motion, LIMIT, converged=converged)
+        _newton(problem, motion, LIMIT, enough=enough)
     except ConvergenceError:
         _grow(problem, motion)
     problem.weigh(motion)
@@ -53,12 +56,14 @@ def _creep(problem: FlowProblem, motion: StepMotion) -> None:
 
 
 def _newton(
-    problem: FlowProblem, motion: StepMotion, limit: int, exact: bool = False, converged: float = CONVERGED
+    problem: FlowProblem, motion: StepMotion, limit: int, exact: bool = False, enough: float = 0.0
 ) -> None:
-    change = np.inf
+    """Newton's method until the change that it would still make is small: the next one shrinks like the last, or like the inner error."""
+    change, inner = np.inf, NEWTON_TOLERANCE if enough else INNER
     for _ in range(limit):
-        last, change = change, problem.newton_update(motion, exact=exact)
-        if change < converged or (change < ROUNDING and change > 0.5 * last):
+        last, change = change, problem.newton_update(motion, exact=exact, tolerance=inner)
+        left = change * max(inner, change / last)
+        if left < CONVERGED or change < enough or (change < ROUNDING and change > 0.5 * last):
             return
         if not np.isfinite(change):
             break

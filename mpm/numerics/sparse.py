@@ -9,6 +9,7 @@ from mpm.numerics.fem import PETSc
 
 from mpi4py import MPI  # isort: skip  (after fem)
 
+BLOCK = 20_000  # rows that are looked at together
 ROUNDING = 1e-16  # of an entry, relative to the root of the product of the two diagonal ones
 
 
@@ -47,21 +48,36 @@ def local_matrix(rows: int, columns: int, row: Ints, column: Ints, values: Float
 def thinned(matrix: PETSc.Mat) -> PETSc.Mat:
     """`matrix`, symmetric with a positive diagonal, without its entries of rounding; that one is destroyed. Collective.
 
-    Assembled forms hold what adds up to nothing, more than half of all entries here.
+    Assembled forms hold what adds up to nothing, more than half of all entries here. Rows are looked at in blocks: whole arrays of what is
+    looked at would take more memory than the matrix.
     """
+    sizes, diagonal = matrix.getSizes(), matrix.getDiagonal()
     starts, columns, values = matrix.getValuesCSR()
-    diagonal = matrix.getDiagonal()
-    needed, place = np.unique(columns, return_inverse=True)
-    others = PETSc.Vec().createSeq(len(needed))
-    scatter = PETSc.Scatter().create(
-        diagonal, PETSc.IS().createGeneral(needed, comm=MPI.COMM_SELF), others, None
-    )
-    scatter.scatter(diagonal, others)
-    rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-    kept = np.abs(values) > ROUNDING * np.sqrt(diagonal.array[rows] * others.array[place])
-    counted = np.concatenate([[0], np.cumsum(kept)])[starts].astype(PETSc.IntType)
-    csr = counted, columns[kept], values[kept]
-    thin = PETSc.Mat().createAIJ(matrix.getSizes(), csr=csr, comm=matrix.comm)
-    for done in (matrix, diagonal, others, scatter):
-        done.destroy()
+    matrix.destroy()
+    own, all_roots = np.sqrt(diagonal.array), np.sqrt(_at(diagonal, columns))
+    kept, counted = np.empty(len(values), dtype=bool), np.zeros_like(starts)
+    for first in range(0, len(own), BLOCK):
+        last = min(first + BLOCK, len(own))
+        part = slice(starts[first], starts[last])
+        limit = np.repeat(ROUNDING * own[first:last], np.diff(starts[first : last + 1]))
+        kept[part] = np.abs(values[part]) > limit * all_roots[columns[part]]
+        so_far = counted[first] + np.cumsum(kept[part])
+        counted[first + 1 : last + 1] = so_far[starts[first + 1 : last + 1] - starts[first] - 1]
+    columns, values = columns[kept], values[kept]
+    thin = PETSc.Mat().createAIJ(sizes, csr=(counted, columns, values), comm=diagonal.comm)
+    diagonal.destroy()
     return thin
+
+
+def _at(vector: PETSc.Vec, places: Ints) -> Floats:
+    """An array of the size of the whole `vector` with its values at these `places`, zero elsewhere. Collective."""
+    found = np.zeros(vector.getSize())
+    found[places] = 1.0
+    wanted = np.flatnonzero(found).astype(PETSc.IntType)
+    part = PETSc.Vec().createSeq(len(wanted))
+    scatter = PETSc.Scatter().create(vector, PETSc.IS().createGeneral(wanted, comm=MPI.COMM_SELF), part, None)
+    scatter.scatter(vector, part)
+    found[wanted] = part.array
+    part.destroy()
+    scatter.destroy()
+    return found
