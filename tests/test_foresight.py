@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from mpm.mesh.strip import STREAMS, interleaved
 from mpm.reactor.reactor import Reactor
-from mpm.transport.cell_matrix import STREAMS, interleaved
 from mpm.transport.foresight import Past, possible
 
 from .cases import SHORT, TINY, zone

@@ -138,7 +138,7 @@ def test_neighbours_and_places() -> None:
     count = total(COMM, [np.count_nonzero(mine & up), np.count_nonzero(mine & ~up)])
     assert count.tolist() == [(grid.rows - 1) * grid.columns, grid.cells]
 
-    corners = strip.mesh.geometry.x[strip.mesh.geometry.dofmaps[0]]
+    corners = strip.mesh.geometry.x[strip.mesh.geometry.dofmaps[0]][strip.mesh_cell]
     expected = np.column_stack([grid.x[strip.column], grid.y[strip.row], 0.0 * strip.row])
     np.testing.assert_allclose(corners[:, 0], expected, atol=1e-9)
     np.testing.assert_allclose(corners[:, 3, 0] - corners[:, 0, 0], grid.dx, rtol=1e-6)

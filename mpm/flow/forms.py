@@ -57,7 +57,7 @@ class FlowForms:
         buoyant = self._medium.buoyant
         if buoyant is None:
             raise ValueError("gas of one density has no weight that counts")
-        buoyant.x.array[buoyant.function_space.dofmap.list[:, 0]] = gas.buoyant
+        self.space.strip.set_cell_values(buoyant, gas.buoyant)
         force = _assembled(self._weight)
         result.array[:] = force.array[: self.space.own]
         force.destroy()

@@ -42,7 +42,7 @@ class FlowSpace:
         element = basix.ufl.element("RTCF", "quadrilateral", 1)
         self.fluxes = dolfinx.fem.functionspace(strip.mesh, element)
         self.own: int = self.fluxes.dofmap.index_map.size_local
-        self.dofs: Ints = self.fluxes.dofmap.list.astype(np.int64)
+        self.dofs: Ints = self.fluxes.dofmap.list[strip.mesh_cell].astype(np.int64)
         ones = dolfinx.fem.Function(self.fluxes)
         ones.interpolate(lambda x: np.ones((2, x.shape[1])))
         self.weights: Floats = ones.x.array
@@ -93,7 +93,7 @@ class FlowSpace:
     def along_x(self, per_cell: dolfinx.fem.Function) -> dolfinx.fem.Function:
         """The field that has a cell function's positive values as velocity along x in those cells, and is zero elsewhere."""
         field = self.function()
-        cell_values = per_cell.x.array[per_cell.function_space.dofmap.list[:, 0]]
+        cell_values = self.strip.values_of(per_cell)
         inside = np.flatnonzero(cell_values > 0.0)
         for side in (LEFT, RIGHT):
             dofs = self.dofs[inside, side]

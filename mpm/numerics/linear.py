@@ -17,6 +17,8 @@ SEQUENTIAL_ROOT = 1
 SPARE = (5, 20, 100, 500)
 ITERATIONS = 200  # of a Krylov solver, before it counts as failed
 DIVERGED = 1e30  # residual over the right-hand side: of next to nothing a guess may be very far off, and is no failure
+BROKEN_DOWN = PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
+RESTARTS = 5  # of BiCGStab that broke down
 FACTOR_FAILED = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
 
 
@@ -119,13 +121,15 @@ class KrylovSolver:
 
     On one rank in its flexible form, with fewer passes over vectors; on several that one, whose residual is not preconditioned, would stop
     before traces far from their inlet are as exact. `fill` levels of fill-in pay for themselves in long steps, or where one factor serves
-    many solves.
+    many solves. The incomplete factor is that of `like`, a matrix nearly the same with fewer entries, where one is given.
     """
 
-    def __init__(self, matrix: PETSc.Mat, name: str, tolerance: float, fill: int = 0):
+    def __init__(
+        self, matrix: PETSc.Mat, name: str, tolerance: float, fill: int = 0, like: PETSc.Mat | None = None
+    ):
         self.name = name
         self.ksp = PETSc.KSP().create(matrix.comm)
-        self.ksp.setOperators(matrix)
+        self.ksp.setOperators(matrix, like or matrix)
         self.ksp.setTolerances(rtol=tolerance, atol=0.0, divtol=DIVERGED, max_it=ITERATIONS)
         alone = matrix.comm.size == 1
         self.ksp.setType("fbcgsr" if alone else "bcgs")
@@ -164,8 +168,17 @@ class KrylovSolver:
         pc.setReusePreconditioner(not refactor)
         self.ksp.setInitialGuessNonzero(guess)
         self.ksp.solve(rhs, solution)
+        iterations = int(self.ksp.getIterationNumber())
+        for _ in range(RESTARTS):
+            if self.ksp.getConvergedReason() != BROKEN_DOWN:
+                break
+            # what is left lies where the first residual was not, as when one inlet feeds a long column: take it for the first one
+            pc.setReusePreconditioner(True)
+            self.ksp.setInitialGuessNonzero(True)
+            self.ksp.solve(rhs, solution)
+            iterations += int(self.ksp.getIterationNumber())
         check(self.ksp, self.name)
-        return int(self.ksp.getIterationNumber())
+        return iterations
 
 
 def check(ksp: PETSc.KSP, name: str) -> None:

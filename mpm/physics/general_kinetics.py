@@ -82,6 +82,10 @@ class GeneralKinetics:
         other.sites, other._table, other._last = self.sites[chosen], self._table.part(chosen), None
         return other
 
+    def bends(self, concentration: Floats, theta: Floats, dt: float) -> NDArray[np.bool_]:
+        """Where rates may not be linear in the concentrations (coupled, n) over a step: nothing is known of any law."""
+        return np.ones(concentration.shape[1], dtype=bool)
+
     def coverage(self, concentration: Floats, theta: Floats, dt: float) -> Floats:
         """theta' (sites, n) after `dt` [s] at the new concentrations (coupled, n) [mol/m3]; not numbers where none are found."""
         gas = self._table.gas_part(np.maximum(concentration, 0.0))

@@ -26,6 +26,8 @@ from mpm.physics.small_systems import invariants
 if TYPE_CHECKING:
     from mpm.physics.mechanism import Mechanism
 
+BENT = 1e-4  # of all sites of a cell
+
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
@@ -77,6 +79,11 @@ class SurfaceKinetics:
         other.sites = self.sites[chosen]
         other.constant = [constant[chosen] for constant in self.constant]
         return other
+
+    def bends(self, concentration: Floats, theta: Floats, dt: float) -> NDArray[np.bool_]:
+        """Where rates are not linear in the concentrations (coupled, n) over a step of `dt` [s]: a share BENT of the sites react in it."""
+        turnover = dt * self._site_rates(concentration) * theta[self.site]
+        return np.asarray((turnover > BENT).any(axis=0))
 
     def coverage(self, concentration: Floats, theta: Floats, dt: float) -> Floats:
         """theta' (sites, n) after `dt` [s] at the new concentrations (coupled, n) [mol/m3]."""

@@ -12,7 +12,6 @@ from mpm.numerics.linear import KrylovSolver, ServingSolver
 from mpm.numerics.sparse import sparse_matrix
 from mpm.transport.fluxes import FluxOperator
 
-STREAMS = 4  # pieces of a rank that a triangular solve goes through at once
 # ranks on which solving the whole system on each takes less time than iterating together: on two 3 ms instead of 13 (49,731 cells,
 # averaged); iterations were not timed on more, and would take half of that on four
 FEW = 4
@@ -41,42 +40,30 @@ class FacePattern:
         return entries
 
 
-def interleaved(row: Ints, column: Ints) -> Ints:
-    """An order of cells in `row` and `column` in which triangular solves are fast: row by row in STREAMS pieces at once.
-
-    A cell waits for its neighbours in the same piece, but not for the cells of other pieces that were just before it, so that a processor
-    has several under way: ILU(2) of 49,731 cells is applied in 0.22 ms instead of 0.55 in the order of the mesh.
-    """
-    by_row = np.lexsort((column, row))
-    length = -(-len(row) // STREAMS)
-    places = np.arange(STREAMS * length).reshape(STREAMS, length).T.ravel()
-    return np.asarray(by_row[places[places < len(row)]])
-
-
 class CellMatrix:
     """A PETSc matrix over own cells with `unknowns` per cell: face fluxes off the diagonal, dense blocks on it.
 
-    `order` lists the own cells in the order of its rows, by default that of the mesh.
+    `dense` are those own cells in which unknowns are coupled to each other, by default all: of the blocks of others only the diagonal is
+    entered.
     """
 
-    def __init__(self, strip: Strip, unknowns: int, order: Ints | None = None):
+    def __init__(self, strip: Strip, unknowns: int, dense: Ints | None = None):
         self.pattern = pattern = FacePattern(strip)
-        self._order = order
         number, own = strip.global_cell, strip.owned
-        if order is not None:
-            place = np.empty(own)
-            place[order] = number[:own]
-            number = strip.scatter.to_all(place)[strip.cell].astype(np.int64)
         each = np.arange(unknowns)
-        i, j = np.divmod(np.arange(unknowns * unknowns), unknowns)
         rows = (number[pattern.cells] * unknowns + each[:, None]).ravel()
         columns = (number[pattern.neighbours] * unknowns + each[:, None]).ravel()
-        block_rows = (number[:own, None] * unknowns + i).ravel()
-        block_columns = (number[:own, None] * unknowns + j).ravel()
-        entries = np.concatenate([rows, block_rows]), np.concatenate([columns, block_columns])
+        coupled = np.ones((own, unknowns, unknowns), dtype=bool)
+        if dense is not None:
+            coupled[:] = np.eye(unknowns, dtype=bool)
+            coupled[dense] = True
+        cell, i, j = np.nonzero(coupled)
+        self._entered = None if dense is None else np.flatnonzero(coupled)  # of all entries of blocks
+        first = number[cell] * unknowns
+        entries = np.concatenate([rows, first + i]), np.concatenate([columns, first + j])
         self.matrix = sparse_matrix(strip.comm, own * unknowns, own * unknowns, entries)
         self._couplings = len(rows)
-        self._values = np.zeros(len(rows) + own * unknowns * unknowns)
+        self._values = np.zeros(len(rows) + len(cell))
         self._diagonal = self.matrix.createVecLeft() if unknowns == 1 else None
         self._versions: list[int] = []  # of the operators in `_values`
         self._outflow = np.empty((0, own))
@@ -96,10 +83,11 @@ class CellMatrix:
     def assemble(self, blocks: Floats) -> None:
         """Set the diagonal blocks (own, unknowns, unknowns) and assemble; of one unknown per cell only the diagonal is entered anew."""
         if self._diagonal is not None and self._holds_fluxes:
-            self._diagonal.array[:] = blocks.ravel() if self._order is None else blocks.ravel()[self._order]
+            self._diagonal.array[:] = blocks.ravel()
             self.matrix.setDiagonal(self._diagonal)
             return
-        self._values[self._couplings :] = blocks.ravel()
+        flat = blocks.ravel()
+        self._values[self._couplings :] = flat if self._entered is None else flat[self._entered]
         self.matrix.setValuesCOO(self._values)
         self._holds_fluxes = True
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from mpm.arrays import Floats
-from mpm.mesh.strip import Strip
 from mpm.numerics.linear import KrylovSolver
 from mpm.parallel import largest, total
-from mpm.transport.cell_matrix import CellMatrix, interleaved
+from mpm.transport.cell_matrix import CellMatrix
 from mpm.transport.fluxes import FluxOperator
 from mpm.transport.ports import Ports
+from mpm.transport.reactions import Reactions
 
 RESIDUAL = (
     1e-12  # sum of |residual| over all cells that Newton's method ends with, relative to the largest feed
@@ -24,6 +25,9 @@ QUADRATIC = 0.3  # inner tolerance over the residual, whose next value is about 
 LAST = 1e-5 * RESIDUAL
 # Krylov iterations with the factor of an earlier matrix after which the next system gets its own, which costs as much as three of them
 PATIENCE = 5
+PATIENCE_COUPLED = 1  # the same of several species
+# coupling of two species by reactions in the gas that an incomplete factor can do without: off-diagonal entries over diagonal ones
+WEAK = 1e-2
 # levels of fill-in of the incomplete factors, for reacting species and for products: with `resolved` every step has a matrix of its own
 FILL = {"resolved": (1, 0), "averaged": (2, 2), "steady": (2, 2)}
 # reacting species up to which a second level pays: factors of blocks of six take three times as long and save one iteration in ten
@@ -60,18 +64,28 @@ def quality(ports: Ports, residual: Floats, carried: float, made: Floats, new: F
 
 
 class NewtonSystem:
-    """The linear systems of Newton's method on the reacting species."""
+    """The linear systems of Newton's method on the species that take part in `reactions`; with incomplete factors of `fill` levels.
 
-    def __init__(self, strip: Strip, unknowns: int, fill: int):
-        self.unknowns = unknowns
-        self.order = interleaved(strip.row[: strip.owned], strip.column[: strip.owned])
-        self.cells = CellMatrix(strip, unknowns, self.order)
-        self.krylov = KrylovSolver(self.cells.matrix, "reacting species", FORCING, fill=fill)
+    Reactions in the gas couple species in every cell. Where they do so weakly, the incomplete factor knows of reactive surfaces alone: it
+    has half the entries, and the time of an iteration is that of reading them.
+    """
+
+    def __init__(self, reactions: Reactions, fill: int):
+        self.unknowns = unknowns = reactions.coupled
+        self._strip, self._fill, self._surfaces = reactions.strip, fill, reactions.coverage.cells
+        gas = unknowns > 1 and bool(reactions.gas.reactions)
+        self.cells = CellMatrix(self._strip, unknowns, None if gas else self._surfaces)
+        self._like = CellMatrix(self._strip, unknowns, self._surfaces) if gas else None
+        self._solvers: dict[bool, KrylovSolver] = {}  # by whether the gas couples species weakly
+        self._weakly = gas
         self.step, self.rhs = self.cells.matrix.createVecs()
+        self._patience = PATIENCE if unknowns == 1 else PATIENCE_COUPLED
         self._iterations = 0  # of the last solve
 
     def set_fluxes(self, operators: Sequence[FluxOperator]) -> Floats:
         """Enter the fluxes of the unknowns; returns what they add to the diagonal, (unknowns, own) [m2/s]."""
+        if self._like is not None:
+            self._like.set_fluxes(operators)
         return self.cells.set_fluxes(operators)
 
     def solve(self, blocks: Floats, residual: Floats, tolerance: float, first: bool) -> Floats:
@@ -80,12 +94,32 @@ class NewtonSystem:
         The factor of the first matrix serves as long as it serves well: cells in which sites run out change the matrix.
         """
         self.cells.assemble(blocks)
-        self.rhs.array[:] = residual[:, self.order].T.ravel()
-        refactor = first or self._iterations > PATIENCE
-        self._iterations = self.krylov.solve(self.rhs, self.step, tolerance, refactor=refactor)
-        step = np.empty_like(residual)
-        step[:, self.order] = self.step.array.reshape(-1, self.unknowns).T
-        return step
+        self.rhs.array[:] = residual.T.ravel()
+        refactor = first or self._iterations > self._patience
+        if first and self._like is not None:
+            self._weakly = self._coupled_weakly(blocks)
+        if refactor and self._like is not None and self._weakly:
+            self._like.assemble(blocks)
+        self._iterations = self._solver().solve(self.rhs, self.step, tolerance, refactor=refactor)
+        return np.array(self.step.array.reshape(-1, self.unknowns).T, order="C")
+
+    def _solver(self) -> KrylovSolver:
+        """The one whose incomplete factor is that of the present coupling in the gas."""
+        if self._weakly not in self._solvers:
+            like = self._like.matrix if self._like is not None and self._weakly else None
+            self._solvers[self._weakly] = KrylovSolver(
+                self.cells.matrix, "reacting species", FORCING, self._fill, like
+            )
+        return self._solvers[self._weakly]
+
+    def _coupled_weakly(self, blocks: Floats) -> bool:
+        """Whether b_ij b_ji < WEAK b_ii b_jj for any two unknowns in cells without a reactive surface; collective."""
+        most = 0.0
+        for i, j in combinations(range(self.unknowns), 2):
+            share = np.abs(blocks[:, i, j] * blocks[:, j, i]) / np.abs(blocks[:, i, i] * blocks[:, j, j])
+            share[self._surfaces] = 0.0
+            most = max(most, share.max(initial=0.0))
+        return bool(largest(self._strip.comm, [most])[0] < WEAK)
 
 
 def forcing(residual: float) -> float:

@@ -129,6 +129,18 @@ class Reactions:
         nu, area = self._nu_surface[:, : self.coupled], self.coverage.area[chosen]
         return nu.T @ rates * area, _slopes(nu, slopes, area)
 
+    def in_cells(
+        self, chosen: Ints, concentration: Floats, theta: Floats, dt: float
+    ) -> tuple[Floats, Floats]:
+        """What is made of coupled species in `chosen` reactive cells over a step of `dt` [s] from the coverages `theta` (sites, reactive
+        cells) to these concentrations (coupled, n), (coupled, n) [mol/m/s], and its derivatives (n, coupled, coupled) [m2/s]."""
+        rates = self.surface.part(chosen).rates(concentration, theta[:, chosen], dt)
+        made, slopes = self.on_surfaces(chosen, *rates)
+        if not self.gas.reactions:
+            return made, slopes
+        in_gas = self.in_gas(self.coverage.cells[chosen], concentration)
+        return made + in_gas[0], slopes + in_gas[1]
+
     def in_gas(self, cells: Ints, concentration: Floats) -> tuple[Floats, Floats]:
         """The same in the gas of own `cells` at these concentrations (coupled, n)."""
         nu, volume = self._nu_gas[:, : self.coupled], self.reacting_volume[cells]

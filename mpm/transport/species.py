@@ -85,7 +85,7 @@ class Transport:
             StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill, fall)
             for d in self.diffusivities
         ]
-        self._newton = NewtonSystem(strip, self.coupled, fill) if self.coupled else None
+        self._newton = NewtonSystem(self.reactions, fill) if self.coupled else None
 
     def _assemble(self) -> None:
         """What builds operators, of a reactor at rest and in motion, in the present state of the gas."""
@@ -245,7 +245,7 @@ class Transport:
         closed = isinstance(reactions.surface, SurfaceKinetics)
         held = 0.0 if closed else TURNED * self.coverage.capacity.sum() / dt
         new = possible(foreseen, old)
-        new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
+        self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
         for iteration in range(NEWTON_LIMIT):
             rates, slopes = reactions.surface.rates(new[:, cells], theta, dt)
             gas_rates, gas_slopes = reactions.gas.rates(new)
@@ -266,7 +266,7 @@ class Transport:
                 blocks[:, i, i] += diagonal[i]
             new = new - newton.solve(blocks, residual, forcing(at.worst), first=iteration == 0)
             if at.worst > BALANCED and closed:
-                new[:, cells] = self._balance(new, matrices, diagonal, rhs, dt)
+                self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
             f"{at.worst:.3g} of the feed, lowest concentration {at.lowest:.3g} mol/m3"
@@ -274,24 +274,23 @@ class Transport:
 
     def _balance(
         self, new: Floats, matrices: list[StepMatrix], diagonal: Floats, rhs: Floats, dt: float
-    ) -> Floats:
-        """Concentrations (coupled, reactive cells) at which those cells balance with their inflow under the iterate `new`.
+    ) -> None:
+        """Change the iterate `new` (coupled, own) in cells whose sites run out, so that they balance with their inflow under it.
 
         A linear step sends the front too far or not far enough, because it does not see the sites of a cell run out
-        (`mpm.numerics.local_newton`); this takes a third off the Newton iterations.
+        (`mpm.numerics.local_newton`); this takes a third off the Newton iterations. It is right elsewhere, where what comes in would bring
+        too little to use sites up.
         """
-        reactions, cells, theta = self.reactions, self.coverage.cells, self.coverage.theta
-        inflow = np.maximum((diagonal * new - self._products(matrices, new) + rhs)[:, cells], 0.0)
+        reactions, reactive, theta = self.reactions, self.coverage.cells, self.coverage.theta
+        products = self._products(matrices, new)
+        here, before = diagonal[:, reactive], new[:, reactive]
+        inflow = np.maximum(here * before - products[:, reactive] + rhs[:, reactive], 0.0)
+        chosen = np.flatnonzero(reactions.surface.bends(np.maximum(before, inflow / here), theta, dt))
+        here, before, inflow = here[:, chosen], before[:, chosen], inflow[:, chosen]
 
         def sources(c: Floats, active: NDArray[np.intp]) -> tuple[Floats, Floats]:
-            rates = reactions.surface.part(active).rates(c, theta[:, active], dt)
-            made, slopes = reactions.on_surfaces(active, *rates)
-            if reactions.gas.reactions:
-                in_gas = reactions.in_gas(cells[active], c)
-                made, slopes = made + in_gas[0], slopes + in_gas[1]
-            return made, slopes
+            return reactions.in_cells(chosen[active], c, theta, dt)
 
         idle = IDLE * self.ports.feed_rate
-        start = np.maximum(new[:, cells], LOWEST)
-        balanced = balance_locally(start, diagonal[:, cells], inflow, sources, idle, tries=3)
-        return np.where(inflow > 0.0, balanced, 0.0)
+        balanced = balance_locally(np.maximum(before, LOWEST), here, inflow, sources, idle, tries=3)
+        new[:, reactive[chosen]] = np.where(inflow > 0.0, balanced, 0.0)
