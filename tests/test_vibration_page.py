@@ -204,3 +204,42 @@ def test_the_answer_is_that_of_the_tables() -> None:
         said = re.search(pattern, text)
         assert said is not None, pattern
         assert float(said[1]) == pytest.approx(measured, abs=within), pattern
+
+
+def over_time(conventions: str, state: str) -> dict[str, str]:
+    """A row of the gains at the thesis' columns over time, of docs/reproduction.md, by heading."""
+    text = (ROOT / "docs" / "reproduction.md").read_text(encoding="utf-8")
+    _, _, section = text.partition("columns, over time\n")
+    lines = [
+        [c.strip() for c in line.strip("| ").split(" | ")]
+        for line in section.splitlines()
+        if line.startswith("| ")
+    ]
+    line = next(line for line in lines if line[:2] == [conventions, state])
+    return dict(zip(lines[0], line, strict=True))
+
+
+def test_gains_over_time_are_those_of_the_reproduction() -> None:
+    """Fails when R8 has been measured again at the thesis' columns and docs/vibration.md tells older gains, times or verdicts of it."""
+    text = re.sub(r"\s+", " ", vibration.ANSWER.read_text(encoding="utf-8"))
+    sentences = {
+        "developed": r"developed\): ([\d.]+) to ([\d.]+) with our conventions, ([\d.]+) to ([\d.]+) with",
+        "start-up": r"impulsive start: ([\d.]+) to ([\d.]+) with ours, ([\d.]+) to ([\d.]+) with",
+    }
+    full = re.search(r"fills up, at ([\d.]+ s) and ([\d.]+ s)", text)
+    assert full is not None
+    for state, pattern in sentences.items():
+        said = re.search(pattern, text)
+        assert said is not None, pattern
+        for conventions, least, most, when in zip(
+            ("mpm", "closed code"), said.groups()[::2], said.groups()[1::2], full.groups(), strict=True
+        ):
+            row = over_time(conventions, state)
+            gains = [float(row[f"{second} s"].split()[0]) for second in range(5, 10)]
+            assert [f"{min(gains):.4f}", f"{max(gains):.4f}"] == [least, most], (state, conventions)
+            assert row["full"] == when
+            assert float(row["20 s"].split()[0]) == 0.0
+            assert float(row["gains"].split()[1]) >= 9.0
+            first, last = (float(row["above its mesh error"].split()[i]) for i in (0, 2))
+            assert (first == 5.0 and last >= 9.0) == (state == "start-up")
+    assert "-0.0021" in over_time("mpm", "start-up")["1.925 s"] and "0.0021: gas" in text
