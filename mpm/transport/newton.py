@@ -26,8 +26,9 @@ LAST = 1e-5 * RESIDUAL
 # Krylov iterations with the factor of an earlier matrix after which the next system gets its own, which costs as much as three of them
 PATIENCE = 5
 PATIENCE_COUPLED = 1  # the same of several species
-# coupling of two species by reactions in the gas that an incomplete factor can do without: off-diagonal entries over diagonal ones
-WEAK = 1e-2
+# coupling of two species by reactions in the gas, off-diagonal entries over diagonal ones: what an incomplete factor can do without, and
+# what the matrix can, since every Newton iteration makes up for all but the root of it
+WEAK, NEGLIGIBLE = 1e-2, 1e-12
 # levels of fill-in of the incomplete factors, for reacting species and for products: with `resolved` every step has a matrix of its own
 FILL = {"resolved": (1, 0), "averaged": (2, 2), "steady": (2, 2)}
 # reacting species up to which a second level pays: factors of blocks of six take three times as long and save one iteration in ten
@@ -66,60 +67,63 @@ def quality(ports: Ports, residual: Floats, carried: float, made: Floats, new: F
 class NewtonSystem:
     """The linear systems of Newton's method on the species that take part in `reactions`; with incomplete factors of `fill` levels.
 
-    Reactions in the gas couple species in every cell. Where they do so weakly, the incomplete factor knows of reactive surfaces alone: it
-    has half the entries, and the time of an iteration is that of reading them.
+    Reactions in the gas couple species in every cell, mostly so weakly that the incomplete factor, and even the matrix, can do without:
+    both then have fewer entries, and the time of an iteration is that of reading them.
     """
 
     def __init__(self, reactions: Reactions, fill: int):
         self.unknowns = unknowns = reactions.coupled
         self._strip, self._fill, self._surfaces = reactions.strip, fill, reactions.coverage.cells
+        self._thin = CellMatrix(
+            self._strip, unknowns, self._surfaces
+        )  # species are coupled on surfaces alone
         gas = unknowns > 1 and bool(reactions.gas.reactions)
-        self.cells = CellMatrix(self._strip, unknowns, None if gas else self._surfaces)
-        self._like = CellMatrix(self._strip, unknowns, self._surfaces) if gas else None
-        self._solvers: dict[bool, KrylovSolver] = {}  # by whether the gas couples species weakly
-        self._weakly = gas
-        self.step, self.rhs = self.cells.matrix.createVecs()
+        self._full = CellMatrix(self._strip, unknowns) if gas else self._thin
+        self._matrix = self._like = self._full  # that of the system, and that of its incomplete factor
+        self._solvers: dict[tuple[CellMatrix, CellMatrix], KrylovSolver] = {}
+        self._operators: Sequence[FluxOperator] = ()
+        self.step, self.rhs = self._thin.matrix.createVecs()
         self._patience = PATIENCE if unknowns == 1 else PATIENCE_COUPLED
         self._iterations = 0  # of the last solve
 
     def set_fluxes(self, operators: Sequence[FluxOperator]) -> Floats:
         """Enter the fluxes of the unknowns; returns what they add to the diagonal, (unknowns, own) [m2/s]."""
-        if self._like is not None:
-            self._like.set_fluxes(operators)
-        return self.cells.set_fluxes(operators)
+        self._operators = operators
+        return self._thin.set_fluxes(operators)
 
     def solve(self, blocks: Floats, residual: Floats, tolerance: float, first: bool) -> Floats:
         """The step (unknowns, own) with `blocks` (own, unknowns, unknowns) on the diagonal, the `first` of an iteration or not; collective.
 
         The factor of the first matrix serves as long as it serves well: cells in which sites run out change the matrix.
         """
-        self.cells.assemble(blocks)
-        self.rhs.array[:] = residual.T.ravel()
+        if first and self._full is not self._thin:
+            coupled = self._coupling(blocks)
+            self._matrix = self._thin if coupled < NEGLIGIBLE else self._full
+            self._like = self._thin if coupled < WEAK else self._full
         refactor = first or self._iterations > self._patience
-        if first and self._like is not None:
-            self._weakly = self._coupled_weakly(blocks)
-        if refactor and self._like is not None and self._weakly:
-            self._like.assemble(blocks)
+        for cells in dict.fromkeys((self._matrix, self._like) if refactor else (self._matrix,)):
+            cells.set_fluxes(self._operators)
+            cells.assemble(blocks)
+        self.rhs.array[:] = residual.T.ravel()
         self._iterations = self._solver().solve(self.rhs, self.step, tolerance, refactor=refactor)
         return np.array(self.step.array.reshape(-1, self.unknowns).T, order="C")
 
     def _solver(self) -> KrylovSolver:
-        """The one whose incomplete factor is that of the present coupling in the gas."""
-        if self._weakly not in self._solvers:
-            like = self._like.matrix if self._like is not None and self._weakly else None
-            self._solvers[self._weakly] = KrylovSolver(
-                self.cells.matrix, "reacting species", FORCING, self._fill, like
-            )
-        return self._solvers[self._weakly]
+        """The one of the present matrix and that whose incomplete factor it takes."""
+        pair = self._matrix, self._like
+        if pair not in self._solvers:
+            matrix, like = pair[0].matrix, pair[1].matrix
+            self._solvers[pair] = KrylovSolver(matrix, "reacting species", FORCING, self._fill, like)
+        return self._solvers[pair]
 
-    def _coupled_weakly(self, blocks: Floats) -> bool:
-        """Whether b_ij b_ji < WEAK b_ii b_jj for any two unknowns in cells without a reactive surface; collective."""
+    def _coupling(self, blocks: Floats) -> float:
+        """Largest b_ij b_ji / (b_ii b_jj) of any two unknowns in cells without a reactive surface; collective."""
         most = 0.0
         for i, j in combinations(range(self.unknowns), 2):
             share = np.abs(blocks[:, i, j] * blocks[:, j, i]) / np.abs(blocks[:, i, i] * blocks[:, j, j])
             share[self._surfaces] = 0.0
             most = max(most, share.max(initial=0.0))
-        return bool(largest(self._strip.comm, [most])[0] < WEAK)
+        return float(largest(self._strip.comm, [most])[0])
 
 
 def forcing(residual: float) -> float:
