@@ -45,8 +45,8 @@ class Convection:
     """
 
     def __init__(self, space: FlowSpace, density: float | Floats):
-        self.space = space
-        self._products = terms = _Products(space, density)
+        self.space, self._density = space, density
+        terms = _Products(space, density)
         local = len(space.weights)
         self._carrier = local_matrix(terms.count // 2, local, *terms.carriers())
         self._carried = local_matrix(terms.count, local, *terms.carried())
@@ -86,7 +86,8 @@ class Convection:
         """Rows, columns (global fluxes) and values of the entries of dN/du that this rank knows of."""
         one, other = self._factors(values)
         numbers = self.space.fluxes.dofmap.index_map.local_to_global(np.arange(len(values), dtype=np.int32))
-        carrier, carried, tests = self._products.carriers(), self._products.carried(), self._products.tests()
+        terms = _Products(self.space, self._density)  # seldom needed, and much to keep
+        carrier, carried, tests = terms.carriers(), terms.carried(), terms.tests()
         one_slope = np.ones_like(one)
         one_slope[self._inward] = one[self._inward] > 0.0
         rows, columns, entries = [], [], []

@@ -15,6 +15,9 @@ METIS = 5  # MUMPS: nested dissection; its own choice needs 1.8 times the memory
 SEQUENTIAL_ROOT = 1
 # MUMPS: per cent of spare workspace, tried in turn: pivoting can need more than was foreseen
 SPARE = (5, 20, 100, 500)
+SINGLE = "single_"  # prefix of PETSc's options, which alone tell of a factor in single precision
+REFINED = 1e-10  # residual over the right-hand side to which FGMRES refines what such a factor gives
+REFINEMENTS = 30  # iterations it may take
 ITERATIONS = 200  # of a Krylov solver, before it counts as failed
 DIVERGED = 1e30  # residual over the right-hand side: of next to nothing a guess may be very far off, and is no failure
 BROKEN_DOWN = PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
@@ -25,11 +28,13 @@ FACTOR_FAILED = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
 class DirectSolver:
     """A sparse factor (MUMPS), made at the first solve and kept; a solve after the matrix has changed makes it anew.
 
-    Symmetric positive `definite` matrices get L L^T: half the memory of LU. On several ranks MUMPS never adds up in the same order twice.
+    Symmetric positive `definite` matrices get L L^T: half the memory of LU. A factor in `single` precision takes little more than half of
+    that again; FGMRES makes up for it in 3 to 5 iterations (GMRES would not: what rounding does to a solve is not linear), and where it
+    does not, a factor in double precision takes its place. On several ranks MUMPS never adds up in the same order twice.
     """
 
-    def __init__(self, matrix: PETSc.Mat, name: str, definite: bool = False):
-        self.name, self.matrix, self.definite = name, matrix, definite
+    def __init__(self, matrix: PETSc.Mat, name: str, definite: bool = False, single: bool = False):
+        self.name, self.matrix, self.definite, self.single = name, matrix, definite, single
         if definite:
             matrix.setOption(PETSc.Mat.Option.SPD, True)
         self._spare = 0
@@ -38,10 +43,16 @@ class DirectSolver:
     def _set_up(self) -> None:
         self.ksp = PETSc.KSP().create(self.matrix.comm)
         self.ksp.setOperators(self.matrix)
-        self.ksp.setType("preonly")
+        self.ksp.setType("fgmres" if self.single else "preonly")
         pc = self.ksp.getPC()
+        if self.single:
+            self.ksp.setTolerances(rtol=REFINED, atol=0.0, max_it=REFINEMENTS)
+            pc.setOptionsPrefix(SINGLE)
+            PETSc.Options()[f"{SINGLE}pc_precision"] = "single"
         pc.setType("cholesky" if self.definite else "lu")
         pc.setFactorSolverType("mumps")
+        if self.single:
+            pc.setFromOptions()
         pc.setFactorSetUpSolverType()
         factor = pc.getFactorMatrix()
         factor.setMumpsIcntl(7, METIS)
@@ -51,15 +62,23 @@ class DirectSolver:
     def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve for one right-hand side. Raises ConvergenceError when the factor or the solution is not usable.
 
-        A factor for which the workspace was too small is made again with more.
+        One in single precision that does not serve is made again in double, one for which the workspace was too small with more.
         """
         self.ksp.solve(rhs, solution)
-        while self.ksp.getConvergedReason() == FACTOR_FAILED and self._spare + 1 < len(SPARE):
-            self._spare += 1
+        while self.ksp.getConvergedReason() < 0 and self._better():
             self.ksp.destroy()
             self._set_up()
             self.ksp.solve(rhs, solution)
         check(self.ksp, self.name)
+
+    def _better(self) -> bool:
+        """Whether a better factor than the one that failed is left to be tried, which is then the one to be made."""
+        if self.single:
+            self.single = False
+            return True
+        short = self.ksp.getConvergedReason() == FACTOR_FAILED and self._spare + 1 < len(SPARE)
+        self._spare += int(short)
+        return short
 
     def destroy(self) -> None:
         """Free the matrix and its factor; collective."""

@@ -120,7 +120,8 @@ class SteadySolver:
         equations.fill_jacobian(at, step)
         matrix = equations.jacobian.matrix
         if self._solver is None:
-            self._solver = DirectSolver(matrix, "steady state")
+            give_back(equations.strip.comm)  # before the largest of all that a run holds
+            self._solver = DirectSolver(matrix, "steady state", single=True)
             self._solution, self._right = matrix.createVecs()
         parts = {"gas": at.gas.T, "coverage": at.coverage.T}
         self._right.array[:] = equations.unknowns.join(parts)
