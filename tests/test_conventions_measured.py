@@ -1,6 +1,7 @@
 """scripts/reproduce.py under two conventions: settings of a lab, switches alone, and what the document says of its columns."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -181,7 +182,8 @@ def test_preset_without_a_switch_lacks_it_alone(tmp_path: Path) -> None:
 
 
 def test_switches_of_the_coarsest_mesh_stand_in_only_where_verdicts_agree() -> None:
-    """Fails when switches measured on a mesh with other verdicts explain a row, or those of its own meshes are passed over."""
+    """Fails when switches measured on a mesh with other verdicts explain a row, those of its own meshes are passed over, or the switches
+    that are needed are not taken from the mesh of the others."""
     one = {SWITCHES[0]: {"R18": finding("not reproduced")}}
     full = columns({"R18": finding()}, {"R18": finding("not reproduced")})
     agreeing = columns({"R18": finding()}, {"R18": finding("not reproduced")}, one)
@@ -191,6 +193,12 @@ def test_switches_of_the_coarsest_mesh_stand_in_only_where_verdicts_agree() -> N
     assert source(full, other, "R18") is full
     assert source(agreeing, other, "R18") is agreeing
     assert source(full, None, "R18") is full
+    left_out = {key: {"R18": finding("not reproduced")} for key in SWITCHES} | {
+        SWITCHES[1]: {"R18": finding()}
+    }
+    needing = replace(agreeing, without=left_out)
+    assert f"| `{SWITCHES[0]}` | " in turns_text(full, needing)
+    assert f"| `{SWITCHES[1]}` |" in turns_text(full, needing)
 
 
 def test_table_states_both_conventions_and_both_meshes() -> None:

@@ -224,7 +224,7 @@ def turns_text(columns: Columns, coarse: Columns | None = None) -> str:
             cells += ["holds" if holds(verdict, condition) else "does not" for verdict in (own, closed)]
             cells.append(", ".join(f"`{key}`" for key, turned in turns.items() if turned) or "none")
             cells.append(", ".join(f"`{key}`" for key in alone() if key not in turns))
-            cells.append(needed(columns, name, condition))
+            cells.append(needed(measured, name, condition))
             text += "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
     return text + "\n" + details(columns, coarse) + "\n"
 
