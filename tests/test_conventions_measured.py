@@ -302,6 +302,9 @@ def test_gain_at_thesis_columns_is_judged_from_five_seconds(
     assert over_time.at(one, 1.925) == "+0.0193 (0.0096)"
     text = over_time.section(columns({}, {}, fine={"mpm": {"R8": found}}))
     assert text.count("\n| mpm |") == 4
+    once = {**one, "mesh error": [0.02 if time == 6.0 else 1.0 for time in one["time"]]}
+    alone = columns({}, {}, fine={"mpm": {"R8": {**finding(), "numbers": {"developed": once}}}})
+    assert "| at 6.0 s alone, by 0.0400 |" in over_time.section(alone)
     assert over_time.section(columns({}, {})) == ""
 
 

@@ -242,4 +242,9 @@ def test_gains_over_time_are_those_of_the_reproduction() -> None:
             assert float(row["gains"].split()[1]) >= 9.0
             first, last = (float(row["above its mesh error"].split()[i]) for i in (0, 2))
             assert (first == 5.0 and last >= 9.0) == (state == "start-up")
+    said = re.search(r"rest in the lab: ([\d.]+) to ([\d.]+) with ours", text)
+    assert said is not None
+    row = over_time("mpm", "developed, inlets in the lab's frame")
+    gains = [float(row[f"{second} s"].split()[0]) for second in range(5, 10)]
+    assert [f"{min(gains):.4f}", f"{max(gains):.4f}"] == list(said.groups())
     assert "-0.0021" in over_time("mpm", "start-up")["1.925 s"] and "0.0021: gas" in text

@@ -97,7 +97,12 @@ def _cells(one: dict[str, Any]) -> list[str]:
         *(at(one, time) for time in SHOWN),
         "–" if when is None else f"{when:.1f} s",
         "never" if until is None else f"until {until:.1f} s",
-        "never"
-        if stretch is None
-        else f"{stretch[0]:.1f} to {stretch[1]:.1f} s, by {stretch[2]:.4f} to {stretch[3]:.4f}",
+        "never" if stretch is None else _said(*stretch),
     ]
+
+
+def _said(first: float, last: float, least: float, most: float) -> str:
+    """A stretch of time and the margins in it."""
+    if first == last:
+        return f"at {first:.1f} s alone, by {least:.4f}"
+    return f"{first:.1f} to {last:.1f} s, by {least:.4f} to {most:.4f}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib import style
 from matplotlib.axes import Axes
@@ -61,7 +63,9 @@ def gains(panel: Axes, lab: Lab) -> None:
     )
     panel.set_title("coverage gained by shaking twice as hard (Γ 0.3 to 0.6)", fontsize=10)
     panel.set_ylabel("gain of the box mean, 5.5 to 6.5 s")
-    panel.legend(fontsize=8, loc="lower right", title="open: extrapolated to no width", title_fontsize=8)
+    # above the curves and below the name of the mesh
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.14, 0.92)}
+    panel.legend(fontsize=8, title="open: extrapolated to no width", title_fontsize=8, **place)
 
 
 def diffusion(panel: Axes, lab: Lab) -> None:
