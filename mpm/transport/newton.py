@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -77,9 +78,8 @@ class NewtonSystem:
         self._thin = CellMatrix(
             self._strip, unknowns, self._surfaces
         )  # species are coupled on surfaces alone
-        gas = unknowns > 1 and bool(reactions.gas.reactions)
-        self._full = CellMatrix(self._strip, unknowns) if gas else self._thin
-        self._matrix = self._like = self._full  # that of the system, and that of its incomplete factor
+        self._gas = unknowns > 1 and bool(reactions.gas.reactions)
+        self._matrix = self._like = self._thin  # that of the system, and that of its incomplete factor
         self._solvers: dict[tuple[CellMatrix, CellMatrix], KrylovSolver] = {}
         self._operators: Sequence[FluxOperator] = ()
         self.step, self.rhs = self._thin.matrix.createVecs()
@@ -96,7 +96,7 @@ class NewtonSystem:
 
         The factor of the first matrix serves as long as it serves well: cells in which sites run out change the matrix.
         """
-        if first and self._full is not self._thin:
+        if first and self._gas:
             coupled = self._coupling(blocks)
             self._matrix = self._thin if coupled < NEGLIGIBLE else self._full
             self._like = self._thin if coupled < WEAK else self._full
@@ -107,6 +107,11 @@ class NewtonSystem:
         self.rhs.array[:] = residual.T.ravel()
         self._iterations = self._solver().solve(self.rhs, self.step, tolerance, refactor=refactor)
         return np.array(self.step.array.reshape(-1, self.unknowns).T, order="C")
+
+    @cached_property
+    def _full(self) -> CellMatrix:
+        """With all couplings; rarely needed."""
+        return CellMatrix(self._strip, self.unknowns)
 
     def _solver(self) -> KrylovSolver:
         """The one of the present matrix and that whose incomplete factor it takes."""

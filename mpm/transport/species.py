@@ -10,6 +10,7 @@ the reacting species alone. Species that are only made follow afterwards, one li
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,13 +80,17 @@ class Transport:
         self._dispersion: Floats | None = None
         self._gas: GasState | None = None
         self._assemble()
-        fill, product_fill = fill_levels(case.fidelity, self.coupled)
+        self._fill, product_fill = fill_levels(case.fidelity, self.coupled)
         residual, fall = self.ports.feed_rate * RESIDUAL, FALL if case.energy is None else FALL_HEATED
         self._linear = [
             StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill, fall)
             for d in self.diffusivities
         ]
-        self._newton = NewtonSystem(self.reactions, fill) if self.coupled else None
+
+    @cached_property
+    def _newton(self) -> NewtonSystem:
+        """Of steps alone: a steady state takes none."""
+        return NewtonSystem(self.reactions, self._fill)
 
     def _assemble(self) -> None:
         """What builds operators, of a reactor at rest and in motion, in the present state of the gas."""
@@ -206,9 +211,9 @@ class Transport:
         supply = self.ports.supply(operators, shares, drawn)
         new, events = old.copy(), self.reactions.none()
         foreseen = self.past.foreseen(old, dt)
-        if self._newton is not None:
+        if coupled:
             new[:coupled], events = self._solve_coupled(
-                self._newton, operators[:coupled], dt, old[:coupled], supply[:coupled], foreseen[:coupled]
+                operators[:coupled], dt, old[:coupled], supply[:coupled], foreseen[:coupled]
             )
         elif self.reactions.surface.reactions:
             events = self.reactions.without_gas(dt)
@@ -228,17 +233,11 @@ class Transport:
         self.ledger.book(self.ports, operators, new, dt, shares, drawn, events)
 
     def _solve_coupled(
-        self,
-        newton: NewtonSystem,
-        operators: Operators,
-        dt: float,
-        old: Floats,
-        supply: Floats,
-        foreseen: Floats,
+        self, operators: Operators, dt: float, old: Floats, supply: Floats, foreseen: Floats
     ) -> tuple[Floats, Events]:
         """Inexact Newton on the reacting species; returns their concentrations at the end of the step and the events of it."""
         reactions, cells, theta = self.reactions, self.coverage.cells, self.coverage.theta
-        matrices = self._matrices(operators, dt)
+        matrices, newton = self._matrices(operators, dt), self._newton
         storage = reactions.gas_volume / dt
         diagonal = newton.set_fluxes(operators) + storage
         rhs = storage * old + supply
