@@ -225,6 +225,7 @@ def test_gains_over_time_are_those_of_the_reproduction() -> None:
     sentences = {
         "developed": r"developed\): ([\d.]+) to ([\d.]+) with our conventions, ([\d.]+) to ([\d.]+) with",
         "start-up": r"impulsive start: ([\d.]+) to ([\d.]+) with ours, ([\d.]+) to ([\d.]+) with",
+        "developed, inlets in the lab's frame": r"in the lab: ([\d.]+) to ([\d.]+) with ours, ([\d.]+) to ([\d.]+) with",
     }
     full = re.search(r"fills up, at ([\d.]+ s) and ([\d.]+ s)", text)
     assert full is not None
@@ -238,13 +239,11 @@ def test_gains_over_time_are_those_of_the_reproduction() -> None:
             gains = [float(row[f"{second} s"].split()[0]) for second in range(5, 10)]
             assert [f"{min(gains):.4f}", f"{max(gains):.4f}"] == [least, most], (state, conventions)
             assert row["full"] == when
-            assert float(row["20 s"].split()[0]) == 0.0
+            assert row["20 s"] == "–" or float(row["20 s"].split()[0]) == 0.0
             assert float(row["gains"].split()[1]) >= 9.0
-            first, last = (float(row["above its mesh error"].split()[i]) for i in (0, 2))
-            assert (first == 5.0 and last >= 9.0) == (state == "start-up")
-    said = re.search(r"rest in the lab: ([\d.]+) to ([\d.]+) with ours", text)
-    assert said is not None
-    row = over_time("mpm", "developed, inlets in the lab's frame")
-    gains = [float(row[f"{second} s"].split()[0]) for second in range(5, 10)]
-    assert [f"{min(gains):.4f}", f"{max(gains):.4f}"] == list(said.groups())
+            times = [float(time) for time in re.findall(r"(\d+\.\d)(?= s| to)", row["above its mesh error"])]
+            if conventions == "mpm" or state == "start-up":
+                assert times[0] == 5.0 and (times[-1] >= 9.0 if state == "start-up" else times[-1] <= 6.0)
+            margin = [float(m) for m in re.findall(r"\d\.\d{4}", row["above its mesh error"])]
+            assert max(margin) <= 0.005 or state == "start-up"
     assert "-0.0021" in over_time("mpm", "start-up")["1.925 s"] and "0.0021: gas" in text
