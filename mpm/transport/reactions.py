@@ -108,9 +108,8 @@ class Reactions:
 
     def made(self, events: Events, species: slice = slice(None)) -> Floats:
         """What they make of every one of these species, (species, own) [mol/m/s]."""
-        made = np.einsum(
-            "ri,rn->in", self._nu_gas[:, species], events.gas
-        )  # of one reaction thrice as fast as @
+        # of one reaction thrice as fast as a product of matrices
+        made = np.asarray(np.einsum("ri,rn->in", self._nu_gas[:, species], events.gas))
         made[:, self.coverage.cells] += self._nu_surface[:, species].T @ events.surface
         return made
 
