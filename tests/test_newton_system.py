@@ -10,22 +10,34 @@ from mpm.transport.newton import NewtonSystem
 from .cases import SHORT, TINY, cycle, zone
 
 
+def random_blocks(diagonal: np.ndarray, strength: float, one_way: bool) -> np.ndarray:
+    """Blocks (cells, 2, 2) with `diagonal` and beside it up to `strength` of that; if `one_way` only the second species feels the first."""
+    blocks = strength * diagonal.T[:, :, None] * np.random.default_rng(3).random((diagonal.shape[1], 2, 2))
+    if one_way:
+        blocks[:, 0, 1] = 0.0
+    for i in range(2):
+        blocks[:, i, i] += diagonal[i]
+    return blocks
+
+
+@pytest.mark.parametrize("one_way", [False, True])
 @pytest.mark.parametrize("strength", [0.0, 1e-3, 1.0, 30.0])
-def test_reactions_in_the_gas_enter_the_step(strength: float) -> None:
-    """Fails when Newton's step is that of the preconditioner, which does not know how reactions of the gas couple species."""
+@pytest.mark.parametrize("weak_before", [False, True])
+def test_reactions_in_the_gas_enter_the_step(strength: float, one_way: bool, weak_before: bool) -> None:
+    """Fails when Newton's step is that of a matrix without the couplings by reactions in the gas, though they are strong: both ways, from
+    one species to the other alone, or only after the first step."""
     system = Reactor(cycle(SHORT, TINY)).system
     transport, operators = system.transport, system.operators(system.velocity)
     newton = NewtonSystem(transport.reactions, 1)
     assert newton.unknowns == 2
     assert transport.reactions.gas.reactions
-    diagonal = newton.set_fluxes(operators[:2]) + transport.reactions.gas_volume / 0.05
-    rng = np.random.default_rng(3)
-    blocks = strength * diagonal.T[:, :, None] * rng.random((diagonal.shape[1], 2, 2))
-    for i in range(2):
-        blocks[:, i, i] += diagonal[i]
-    residual = rng.standard_normal(diagonal.shape)
-    step = newton.solve(blocks, residual, 1e-12, first=True)
     storage = transport.reactions.gas_volume / 0.05
+    diagonal = newton.set_fluxes(operators[:2]) + storage
+    residual = np.random.default_rng(4).standard_normal(diagonal.shape)
+    if weak_before:
+        newton.solve(random_blocks(diagonal, 0.0, one_way), residual, 1e-2, first=True)
+    blocks = random_blocks(diagonal, strength, one_way)
+    step = newton.solve(blocks, residual, 1e-12, first=not weak_before)
     fluxes = transport.flux_product(operators[:2], step) + storage * step
     sources = np.einsum("nij,jn->in", blocks, step) - diagonal * step
     np.testing.assert_allclose(fluxes + sources, residual, atol=1e-9)

@@ -18,7 +18,7 @@ SPARE = (5, 20, 100, 500)
 SINGLE = "single_"  # prefix of PETSc's options, which alone tell of a factor in single precision
 REFINED = 1e-10  # residual over the right-hand side to which FGMRES refines what such a factor gives
 REFINEMENTS = 30  # iterations it may take
-ITERATIONS = 200  # of a Krylov solver, before it counts as failed
+ITERATIONS = 200  # of a Krylov solver, before it counts as failed, from each start
 DIVERGED = 1e30  # residual over the right-hand side: of next to nothing a guess may be very far off, and is no failure
 BROKEN_DOWN = PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
 RESTARTS = 5  # of BiCGStab that broke down
@@ -53,7 +53,15 @@ class DirectSolver:
         pc.setFactorSolverType("mumps")
         if self.single:
             pc.setFromOptions()
-        pc.setFactorSetUpSolverType()
+        try:
+            pc.setFactorSetUpSolverType()
+        except PETSc.Error:  # MUMPS was built without single precision
+            if not self.single:
+                raise
+            self.single = False
+            self.ksp.destroy()
+            self._set_up()
+            return
         factor = pc.getFactorMatrix()
         factor.setMumpsIcntl(7, METIS)
         factor.setMumpsIcntl(13, SEQUENTIAL_ROOT)

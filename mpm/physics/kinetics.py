@@ -81,7 +81,7 @@ class SurfaceKinetics:
         return other
 
     def bends(self, concentration: Floats, theta: Floats, dt: float) -> NDArray[np.bool_]:
-        """Where rates are not linear in the concentrations (coupled, n) over a step of `dt` [s]: a share BENT of the sites react in it."""
+        """Where a share BENT of all sites reacts in a step of `dt` [s] at these concentrations (coupled, n), as if none ran out."""
         turnover = dt * self._site_rates(concentration) * theta[self.site]
         return np.asarray((turnover > BENT).any(axis=0))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from itertools import permutations
 
 import numpy as np
 
@@ -27,9 +27,9 @@ LAST = 1e-5 * RESIDUAL
 # Krylov iterations with the factor of an earlier matrix after which the next system gets its own, which costs as much as three of them
 PATIENCE = 5
 PATIENCE_COUPLED = 1  # the same of several species
-# coupling of two species by reactions in the gas, off-diagonal entries over diagonal ones: what an incomplete factor can do without, and
-# what the matrix can, since every Newton iteration makes up for all but the root of it
-WEAK, NEGLIGIBLE = 1e-2, 1e-12
+# coupling of two species by reactions in the gas (`NewtonSystem._coupling`): what an incomplete factor can do without, and what the matrix
+# can, since every Newton iteration leaves no more than that share of a residual
+WEAK, NEGLIGIBLE = 0.1, 1e-6
 # levels of fill-in of the incomplete factors, for reacting species and for products: with `resolved` every step has a matrix of its own
 FILL = {"resolved": (1, 0), "averaged": (2, 2), "steady": (2, 2)}
 # reacting species up to which a second level pays: factors of blocks of six take three times as long and save one iteration in ten
@@ -81,6 +81,7 @@ class NewtonSystem:
         self._gas = unknowns > 1 and bool(reactions.gas.reactions)
         self._matrix = self._like = self._thin  # that of the system, and that of its incomplete factor
         self._solvers: dict[tuple[CellMatrix, CellMatrix], KrylovSolver] = {}
+        self._coupled = 0.0  # in this step so far
         self._operators: Sequence[FluxOperator] = ()
         self.step, self.rhs = self._thin.matrix.createVecs()
         self._patience = PATIENCE if unknowns == 1 else PATIENCE_COUPLED
@@ -96,11 +97,8 @@ class NewtonSystem:
 
         The factor of the first matrix serves as long as it serves well: cells in which sites run out change the matrix.
         """
-        if first and self._gas:
-            coupled = self._coupling(blocks)
-            self._matrix = self._thin if coupled < NEGLIGIBLE else self._full
-            self._like = self._thin if coupled < WEAK else self._full
-        refactor = first or self._iterations > self._patience
+        changed = self._gas and self._choose(blocks, first)
+        refactor = first or changed or self._iterations > self._patience
         for cells in dict.fromkeys((self._matrix, self._like) if refactor else (self._matrix,)):
             cells.set_fluxes(self._operators)
             cells.assemble(blocks)
@@ -123,11 +121,21 @@ class NewtonSystem:
             self._solvers[pair] = KrylovSolver(matrix, "reacting species", FORCING, self._fill, like)
         return self._solvers[pair]
 
+    def _choose(self, blocks: Floats, first: bool) -> bool:
+        """Take the matrices for the coupling in `blocks`, later in a step for the strongest so far; tells whether they are others.
+        Collective."""
+        before, now = (self._matrix, self._like), self._coupling(blocks)
+        self._coupled = now if first else max(self._coupled, now)
+        self._matrix = self._thin if self._coupled < NEGLIGIBLE else self._full
+        self._like = self._thin if self._coupled < WEAK else self._full
+        return (self._matrix, self._like) != before
+
     def _coupling(self, blocks: Floats) -> float:
-        """Largest b_ij b_ji / (b_ii b_jj) of any two unknowns in cells without a reactive surface; collective."""
+        """Largest |b_ij / b_jj| of two unknowns in cells without a reactive surface: what share of a change of j comes back as a residual
+        of i. Collective."""
         most = 0.0
-        for i, j in combinations(range(self.unknowns), 2):
-            share = np.abs(blocks[:, i, j] * blocks[:, j, i]) / np.abs(blocks[:, i, i] * blocks[:, j, j])
+        for i, j in permutations(range(self.unknowns), 2):
+            share = np.abs(blocks[:, i, j] / blocks[:, j, j])
             share[self._surfaces] = 0.0
             most = max(most, share.max(initial=0.0))
         return float(largest(self._strip.comm, [most])[0])

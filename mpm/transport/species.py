@@ -277,8 +277,8 @@ class Transport:
         """Change the iterate `new` (coupled, own) in cells whose sites run out, so that they balance with their inflow under it.
 
         A linear step sends the front too far or not far enough, because it does not see the sites of a cell run out
-        (`mpm.numerics.local_newton`); this takes a third off the Newton iterations. It is right elsewhere, where what comes in would bring
-        too little to use sites up.
+        (`mpm.numerics.local_newton`); this takes a third off the Newton iterations. A linear step is right where what comes in would use
+        up next to none of the sites.
         """
         reactions, reactive, theta = self.reactions, self.coverage.cells, self.coverage.theta
         products = self._products(matrices, new)
