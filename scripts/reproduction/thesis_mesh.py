@@ -85,7 +85,7 @@ def growth(lab: Lab) -> Iterator[Finding]:
         checks.add(state, gain.min() > error)
         parts.append(
             f"{state} {gain[0]:+.4f} at {times[0]:.1f} s, {gain[-1]:+.4f} at {times[-1]:.1f} s, "
-            f"least {gain.min():+.4f} (mesh {error:.4f})"
+            f"least {np.round(gain.min(), 4) + 0.0:+.4f} (mesh {error:.4f})"
         )
         yield Finding(checks.verdict, "Gamma 0.3 to 0.6: " + "; ".join(parts), dict(numbers))
 
