@@ -13,7 +13,7 @@ from mpm.flow.sequence import CyclicFlow
 from mpm.mesh.strip import Strip
 from mpm.parallel import largest
 from mpm.reactor.reactor import Reactor, Result
-from mpm.report.balances import element_balances, site_balance, species_balances
+from mpm.report.balances import FLOOR, TERMS, element_balances, site_balance, species_balances
 from mpm.report.records import HeatTotals
 
 from mpi4py import MPI as MPI  # isort: skip  (after mpm.numerics.fem)
@@ -79,15 +79,20 @@ def column_case(
 def assert_laws(reactor: Reactor) -> None:
     """Assert what holds in every run at any time; collective, and usable as the callback of a run.
 
-    Species, sites and elements balance to 1e-9; no concentration lies below -1e-14 of the feed; coverages lie in [0, 1] and sum to 1; div u
+    Species, sites and elements balance to 1e-9, traces below 1e-6 of the feed to 1e-13 of that, which is what the rounding of reactions
+    that go both ways makes of them; no concentration lies below -1e-14 of the feed; coverages lie in [0, 1] and sum to 1; div u
     of any cell is below 1e-10 of the inflow, in every velocity field in use; what flows in flows out. With heat, heat closes to 1e-9 of its
     largest term and the gas itself to 1e-12.
     """
     case, comm, strip = reactor.case, reactor.comm, reactor.system.strip
     totals = reactor.totals()
-    errors = {name: entry["balance_error"] for name, entry in species_balances(case, totals).items()}
+    balances = species_balances(case, totals)
+    little = FLOOR * float(totals.fed.sum(axis=0).max(initial=0.0))
+    traces = {name for name, one in balances.items() if max(map(abs, (one[term] for term in TERMS))) < little}
+    errors = {name: one["balance_error"] for name, one in balances.items()}
     errors |= {"sites": site_balance(case, totals), **element_balances(case, totals)}
-    assert max(errors.values()) <= 1e-9, f"t = {reactor.time:g} s: balances {errors}"
+    off = {name: error for name, error in errors.items() if not error <= (1e-7 if name in traces else 1e-9)}
+    assert not off, f"t = {reactor.time:g} s: balances {off}"
 
     transport, theta = reactor.system.transport, reactor.system.coverage.theta
     lowest = -largest(comm, [-transport.concentration.min(initial=0.0)])[0]

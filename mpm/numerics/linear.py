@@ -146,20 +146,27 @@ class ServingSolver:
 class KrylovSolver:
     """BiCGStab with incomplete LU on each rank; the right choice for advection-diffusion-reaction with small steps.
 
-    On one rank in its flexible form, with fewer passes over vectors; on several that one, whose residual is not preconditioned, would stop
-    before traces far from their inlet are as exact. `fill` levels of fill-in pay for themselves in long steps, or where one factor serves
-    many solves. The incomplete factor is that of `like`, a matrix nearly the same with fewer entries, where one is given.
+    On one rank in its flexible form, with fewer passes over vectors; on several, or where errors shall be `even`, that one, whose residual
+    is not preconditioned, would stop before traces far from their inlet are as exact. `fill` levels of fill-in pay for themselves in long
+    steps, or where one factor serves many solves. The incomplete factor is that of `like`, a matrix nearly the same with fewer entries,
+    where one is given.
     """
 
     def __init__(
-        self, matrix: PETSc.Mat, name: str, tolerance: float, fill: int = 0, like: PETSc.Mat | None = None
+        self,
+        matrix: PETSc.Mat,
+        name: str,
+        tolerance: float,
+        fill: int = 0,
+        like: PETSc.Mat | None = None,
+        even: bool = False,
     ):
         self.name = name
         self.ksp = PETSc.KSP().create(matrix.comm)
         self.ksp.setOperators(matrix, like or matrix)
         self.ksp.setTolerances(rtol=tolerance, atol=0.0, divtol=DIVERGED, max_it=ITERATIONS)
         alone = matrix.comm.size == 1
-        self.ksp.setType("fbcgsr" if alone else "bcgs")
+        self.ksp.setType("fbcgsr" if alone and not even else "bcgs")
         self._blocks = not alone  # to be told of `fill`; they exist once there is a matrix to solve with
         self._fill = fill
         if alone:

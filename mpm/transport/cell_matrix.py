@@ -93,17 +93,25 @@ class CellMatrix:
 
 
 class StepMatrix:
-    """storage/dt + fluxes for what spreads alike, with the solvers that go with it; `fill` as in KrylovSolver.
+    """storage/dt + fluxes for what spreads alike, with the solvers that go with it; `fill` and `even` as in KrylovSolver.
 
     Stored are species, in the volume of the gas, unless `update` says otherwise. A solution leaves a sum of |residual| over all cells below
     `residual` [mol/m/s].
     """
 
-    def __init__(self, strip: Strip, name: str, residual: float, fill: int = 0, fall: float = FALL):
+    def __init__(
+        self,
+        strip: Strip,
+        name: str,
+        residual: float,
+        fill: int = 0,
+        fall: float = FALL,
+        even: bool = False,
+    ):
         self.strip, self.name = strip, name
         self.cells = CellMatrix(strip, 1)
         self._holds: tuple[int, float] | None = None
-        self._krylov = KrylovSolver(self.cells.matrix, name, 0.0, fill=fill)
+        self._krylov = KrylovSolver(self.cells.matrix, name, 0.0, fill=fill, even=even)
         least = residual / np.sqrt(max(self.cells.matrix.size[0], 1))
         self._krylov.ksp.setTolerances(rtol=fall, atol=least)
         self._least, self._heated = least, fall == FALL_HEATED

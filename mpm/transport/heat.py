@@ -69,7 +69,8 @@ class Heat:
         self._columns = SlidingColumns(fresh, self.fluxes.periodic)
         spread = case.temperatures[-1] - case.temperatures[0]
         held = float(total(strip.comm, [(self.solid + strip.gas_volume[own]).sum()])[0])
-        self._matrix = StepMatrix(strip, "heat", RESIDUAL * held * max(spread, NO_SPREAD), FILL)
+        least = RESIDUAL * held * max(spread, NO_SPREAD)
+        self._matrix = StepMatrix(strip, "heat", least, FILL, even=True)
 
     @property
     def temperature(self) -> Floats:
