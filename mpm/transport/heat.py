@@ -36,7 +36,9 @@ from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 if TYPE_CHECKING:
     from mpm.case.case import Case
 
-RESIDUAL = 1e-13  # of what the strip holds over its spread of temperatures, per second: the sum of |residual| that a step may leave
+# of what the strip holds over its spread of temperatures, per second: a residual, over the diagonal, that a step may leave in any case; as
+# a rule it is 1e-13 of the imbalance that the step begins with
+RESIDUAL = 1e-17
 NO_SPREAD = 1e-6  # K, in place of a spread of nothing
 FILL = 1
 
