@@ -1,6 +1,7 @@
 """Whole runs under other conventions: the preset, laws and bounds under combinations of all switches, ranks, restart."""
 
 import random
+import sys
 from collections.abc import Iterator, Mapping
 from itertools import combinations, product
 from pathlib import Path
@@ -18,6 +19,10 @@ from mpm.flow.sequence import CyclicFlow
 from mpm.reactor.reactor import Reactor
 from mpm.sweep.plan import plan
 from mpm.sweep.sweepfile import read_sweep
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+
+from conventions import DRAWING
 
 from .cases import HEATED, MPI, TINY, assert_same_numbers, cycle, run, zone
 from .general import SIX_GASES
@@ -48,17 +53,6 @@ TIMES: dict[str, dict[str, Any]] = {
         "fidelity": "resolved", "time.end": "0.2 s", "time.steps_per_cycle": 8, "output.every": "0.2 s",
     },
 }  # fmt: skip
-DRAWING = {
-    "geometry.periodic": False,
-    "geometry.outlet": [
-        {"name": "upstream", "center": "30 mm", "width": "20 mm"},
-        {"name": "downstream", "center": "119 mm", "width": "20 mm"},
-    ],
-    "geometry.inlet.purge.velocity": "1 mm/s",
-    "geometry.inlet.tma.velocity": "1 mm/s",
-    "motion.bed_velocity": "3 cm/s",
-}
-"""Between closed ends the bed drags gas out at the right and so in at the left, in every fidelity."""
 
 
 def draws_in(reactor: Reactor) -> bool:

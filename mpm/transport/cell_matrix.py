@@ -96,7 +96,8 @@ class StepMatrix:
     """storage/dt + fluxes for what spreads alike, with the solvers that go with it; `fill` and `even` as in KrylovSolver.
 
     Stored are species, in the volume of the gas, unless `update` says otherwise. A solution leaves a sum of |residual| over all cells below
-    `residual` [mol/m/s].
+    `residual` [mol/m/s], or `fall` of that which it starts from; where residuals are weighed by the diagonal (several ranks, `even`) that
+    holds of weighed ones.
     """
 
     def __init__(
