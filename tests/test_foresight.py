@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from mpm.mesh.strip import STREAMS, interleaved
 from mpm.reactor.reactor import Reactor
 from mpm.transport.foresight import Past, possible
 
@@ -62,18 +61,3 @@ def test_only_exact_sums_are_tied(fed: dict[str, float], exact: bool) -> None:
     case = zone({**SHORT, "geometry.inlet.tma.mass_fractions": fed}, TINY)
     reactions = Reactor(case).system.transport.reactions
     assert reactions.tied == pytest.approx(np.ones((1, 1)) if exact else np.zeros((2, 2)))
-
-
-@pytest.mark.parametrize("cells", [0, 1, 3, 4, 24, 50])
-def test_interleaved_order(cells: int) -> None:
-    """Fails when a cell is missing or doubled, or neighbours in the order are not cells of pieces that follow row by row."""
-    row, column = np.divmod(np.random.default_rng(1).permutation(cells), 7)
-    order = interleaved(row, column)
-    assert sorted(order) == list(range(cells))
-    by_row = (7 * row + column)[order]  # the place of each in a walk row by row
-    length = -(-cells // STREAMS)
-    for piece in range(STREAMS):
-        mine = by_row[(by_row >= piece * length) & (by_row < (piece + 1) * length)]
-        assert list(mine) == sorted(mine)
-    if cells == 24:
-        assert by_row[:5].tolist() == [0, 6, 12, 18, 1]

@@ -5,7 +5,8 @@ import pytest
 
 from mpm.physics.kinetics import BENT, SurfaceKinetics
 from mpm.reactor.reactor import Reactor
-from mpm.transport.newton import NewtonSystem
+from mpm.transport.newton import NewtonSystem, mutual_coupling
+from mpm.transport.step_matrix import StepMatrix
 
 from .cases import SHORT, TINY, cycle, zone
 
@@ -22,25 +23,36 @@ def random_blocks(diagonal: np.ndarray, strength: float, one_way: bool) -> np.nd
 
 @pytest.mark.parametrize("one_way", [False, True])
 @pytest.mark.parametrize("strength", [0.0, 1e-3, 1.0, 30.0])
-@pytest.mark.parametrize("weak_before", [False, True])
-def test_reactions_in_the_gas_enter_the_step(strength: float, one_way: bool, weak_before: bool) -> None:
-    """Fails when Newton's step is that of a matrix without the couplings by reactions in the gas, though they are strong: both ways, from
-    one species to the other alone, or only after the first step."""
+def test_reactions_in_the_gas_enter_the_step(strength: float, one_way: bool) -> None:
+    """Fails when Newton's step is that of a matrix without the couplings by reactions, both ways or from one species to the other alone."""
     system = Reactor(cycle(SHORT, TINY)).system
     transport, operators = system.transport, system.operators(system.velocity)
-    newton = NewtonSystem(transport.reactions, 1)
-    assert newton.unknowns == 2
-    assert transport.reactions.gas.reactions
-    storage = transport.reactions.gas_volume / 0.05
-    diagonal = newton.set_fluxes(operators[:2]) + storage
+    newton, dt = NewtonSystem(transport.reactions), 0.05
+    matrices = [StepMatrix(system.strip, "species", 0.0) for _ in range(2)]
+    for matrix, operator in zip(matrices, operators, strict=False):
+        matrix.update(operator, dt)
+    newton.set_fluxes(matrices)
+    diagonal = np.stack([matrix.diagonal for matrix in matrices])
     residual = np.random.default_rng(4).standard_normal(diagonal.shape)
-    if weak_before:
-        newton.solve(random_blocks(diagonal, 0.0, one_way), residual, 1e-2, first=True)
     blocks = random_blocks(diagonal, strength, one_way)
-    step = newton.solve(blocks, residual, 1e-12, first=not weak_before)
+    step = newton.solve(blocks, residual, 1e-12)
+    storage = transport.reactions.gas_volume / dt
     fluxes = transport.flux_product(operators[:2], step) + storage * step
     sources = np.einsum("nij,jn->in", blocks, step) - diagonal * step
     np.testing.assert_allclose(fluxes + sources, residual, atol=1e-9)
+
+
+def test_mutual_coupling() -> None:
+    """Fails when a coupling that comes back by way of a third species is overlooked, or one that never does is counted."""
+    blocks = np.tile(np.eye(3), (4, 1, 1))
+    blocks[1, 0, 1] = 1e6  # one way
+    assert mutual_coupling(blocks) == 0.0
+    assert mutual_coupling(blocks[:, :2, :2]) == 0.0
+    blocks[2, 0, 1] = blocks[2, 1, 2] = blocks[2, 2, 0] = -0.5
+    assert mutual_coupling(blocks) == pytest.approx(0.125)
+    blocks[3, 0, 1] = blocks[3, 1, 0] = 0.6
+    assert mutual_coupling(blocks) == pytest.approx(0.36)
+    assert mutual_coupling(blocks[:, :2, :2]) == pytest.approx(0.36)
 
 
 def test_where_rates_are_linear() -> None:

@@ -15,7 +15,7 @@ import mpm.transport.species
 from mpm.case.case import Case
 from mpm.errors import ConvergenceError, InputError
 from mpm.reactor.reactor import Reactor
-from mpm.transport.cell_matrix import StepMatrix
+from mpm.transport.step_matrix import StepMatrix
 
 from .cases import MPI, SHORT, TINY, assert_laws, assert_same_numbers, cycle, physical_numbers, run, zone
 

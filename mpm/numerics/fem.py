@@ -126,12 +126,17 @@ def reported(jit: Callable[..., Any]) -> Callable[..., Any]:
         try:
             return jit(*arguments, **options)
         except (RuntimeError, TimeoutError, cffi.VerificationError) as error:
-            said = shorten(str(error), 120)
-            raise InputError(
-                f"{cache_directory()}: the equations cannot be compiled ({said}); a C compiler and room for the files are needed"
-            ) from error
+            raise cannot_compile(error) from error
 
     return compile_reported
+
+
+def cannot_compile(error: Exception) -> InputError:
+    """What to raise for an `error` of the compiler."""
+    said = shorten(str(error), 120)
+    return InputError(
+        f"{cache_directory()}: the equations cannot be compiled ({said}); a C compiler and room for the files are needed"
+    )
 
 
 dolfinx.jit.ffcx_jit = reported(dolfinx.jit.ffcx_jit)

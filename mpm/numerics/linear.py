@@ -19,9 +19,6 @@ SINGLE = "single_"  # prefix of PETSc's options, which alone tell of a factor in
 REFINED = 1e-10  # residual over the right-hand side to which FGMRES refines what such a factor gives
 REFINEMENTS = 30  # iterations it may take
 ITERATIONS = 200  # of a Krylov solver, before it counts as failed, from each start
-DIVERGED = 1e30  # residual over the right-hand side: of next to nothing a guess may be very far off, and is no failure
-BROKEN_DOWN = PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
-RESTARTS = 5  # of BiCGStab that broke down
 FACTOR_FAILED = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
 
 
@@ -141,78 +138,6 @@ class ServingSolver:
                 self._copy.destroy()
             self._copy = matrix
         self.ksp.setOperators(matrix)
-
-
-class KrylovSolver:
-    """BiCGStab with incomplete LU on each rank; the right choice for advection-diffusion-reaction with small steps.
-
-    On one rank in its flexible form, with fewer passes over vectors; on several, or where errors shall be `even`, that one, whose residual
-    is not preconditioned, would stop before traces far from their inlet are as exact. `fill` levels of fill-in pay for themselves in long
-    steps, or where one factor serves many solves. The incomplete factor is that of `like`, a matrix nearly the same with fewer entries,
-    where one is given.
-    """
-
-    def __init__(
-        self,
-        matrix: PETSc.Mat,
-        name: str,
-        tolerance: float,
-        fill: int = 0,
-        like: PETSc.Mat | None = None,
-        even: bool = False,
-    ):
-        self.name = name
-        self.ksp = PETSc.KSP().create(matrix.comm)
-        self.ksp.setOperators(matrix, like or matrix)
-        self.ksp.setTolerances(rtol=tolerance, atol=0.0, divtol=DIVERGED, max_it=ITERATIONS)
-        alone = matrix.comm.size == 1
-        self.ksp.setType("fbcgsr" if alone and not even else "bcgs")
-        self._blocks = not alone  # to be told of `fill`; they exist once there is a matrix to solve with
-        self._fill = fill
-        if alone:
-            self._factor(self.ksp.getPC())
-        else:
-            self.ksp.getPC().setType("bjacobi")
-
-    def _factor(self, pc: PETSc.PC) -> None:
-        """Make `pc` the incomplete factor of a matrix that lies on one rank."""
-        pc.setType("ilu")
-        pc.setFactorLevels(self._fill)
-
-    def solve(
-        self,
-        rhs: PETSc.Vec,
-        solution: PETSc.Vec,
-        tolerance: float | None = None,
-        guess: bool = False,
-        refactor: bool = True,
-    ) -> int:
-        """Solve to the relative `tolerance`; returns the number of iterations. Raises ConvergenceError.
-
-        Without `refactor` the incomplete factor of an earlier matrix goes on serving as the preconditioner.
-        """
-        if tolerance is not None:
-            self.ksp.rtol = tolerance
-        pc = self.ksp.getPC()
-        if self._blocks:
-            self.ksp.setUp()
-            for block in pc.getBJacobiSubKSP():
-                self._factor(block.getPC())
-            self._blocks = False
-        pc.setReusePreconditioner(not refactor)
-        self.ksp.setInitialGuessNonzero(guess)
-        self.ksp.solve(rhs, solution)
-        iterations = int(self.ksp.getIterationNumber())
-        for _ in range(RESTARTS):
-            if self.ksp.getConvergedReason() != BROKEN_DOWN:
-                break
-            # what is left lies where the first residual was not, as when one inlet feeds a long column: take it for the first one
-            pc.setReusePreconditioner(True)
-            self.ksp.setInitialGuessNonzero(True)
-            self.ksp.solve(rhs, solution)
-            iterations += int(self.ksp.getIterationNumber())
-        check(self.ksp, self.name)
-        return iterations
 
 
 def check(ksp: PETSc.KSP, name: str) -> None:

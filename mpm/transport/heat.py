@@ -23,24 +23,18 @@ from mpm.arrays import Floats
 from mpm.flow.state import GasState
 from mpm.mesh.strip import Strip
 from mpm.parallel import largest, total
-from mpm.transport.cell_matrix import StepMatrix
 from mpm.transport.columns import Beyond, SlidingColumns
 from mpm.transport.conduction import solid_capacity
 from mpm.transport.heat_flux import Diffusing, HeatFluxes, HeatOperator
 from mpm.transport.heat_ledger import HeatLedger, HeatPassed
 from mpm.transport.plausible import require_plausible
+from mpm.transport.step_matrix import StepMatrix
 from mpm.transport.tracers import steady_fields
 
 from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
-
-# of what the strip holds over its spread of temperatures, per second: a residual, over the diagonal, that a step may leave in any case; as
-# a rule it is 1e-13 of the imbalance that the step begins with
-RESIDUAL = 1e-17
-NO_SPREAD = 1e-6  # K, in place of a spread of nothing
-FILL = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +53,7 @@ class Heat:
     """
 
     def __init__(self, case: Case, strip: Strip):
-        energy, own = case.energy, slice(0, strip.owned)
+        energy = case.energy
         if energy is None:
             raise ValueError("a case without [energy] has one temperature")
         self.strip, self.fluxes = strip, HeatFluxes(case, strip)
@@ -69,10 +63,7 @@ class Heat:
         self._moving = np.flatnonzero(strip.grid.moving)
         fresh = np.full((1, len(self._moving)), self.fluxes.entering)
         self._columns = SlidingColumns(fresh, self.fluxes.periodic)
-        spread = case.temperatures[-1] - case.temperatures[0]
-        held = float(total(strip.comm, [(self.solid + strip.gas_volume[own]).sum()])[0])
-        least = RESIDUAL * held * max(spread, NO_SPREAD)
-        self._matrix = StepMatrix(strip, "heat", least, FILL, even=True)
+        self._matrix = StepMatrix(strip, "heat", 0.0)  # to FALL of each imbalance
 
     @property
     def temperature(self) -> Floats:

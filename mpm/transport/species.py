@@ -25,15 +25,15 @@ from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.parallel import Scatter
 from mpm.physics.kinetics import SurfaceKinetics
 from mpm.physics.roles import Roles
-from mpm.transport.cell_matrix import FALL, FALL_HEATED, StepMatrix
 from mpm.transport.coverage import Coverage
 from mpm.transport.diffusant import Diffusant
 from mpm.transport.fluxes import FluxAssembler, FluxOperator
 from mpm.transport.foresight import REMEMBERED, Past, possible
 from mpm.transport.ledger import Entries, Ledger
-from mpm.transport.newton import RESIDUAL, NewtonSystem, fill_levels, forcing, quality
+from mpm.transport.newton import RESIDUAL, NewtonSystem, forcing, quality
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Events, Reactions
+from mpm.transport.step_matrix import FALL, FALL_HEATED, StepMatrix
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
@@ -80,17 +80,15 @@ class Transport:
         self._dispersion: Floats | None = None
         self._gas: GasState | None = None
         self._assemble()
-        self._fill, product_fill = fill_levels(case.fidelity, self.coupled)
         residual, fall = self.ports.feed_rate * RESIDUAL, FALL if case.energy is None else FALL_HEATED
         self._linear = [
-            StepMatrix(strip, f"species with D = {d:g} m2/s", residual, product_fill, fall)
-            for d in self.diffusivities
+            StepMatrix(strip, f"species with D = {d:g} m2/s", residual, fall) for d in self.diffusivities
         ]
 
     @cached_property
     def _newton(self) -> NewtonSystem:
         """Of steps alone: a steady state takes none."""
-        return NewtonSystem(self.reactions, self._fill)
+        return NewtonSystem(self.reactions)
 
     def _assemble(self) -> None:
         """What builds operators, of a reactor at rest and in motion, in the present state of the gas."""
@@ -238,14 +236,14 @@ class Transport:
         """Inexact Newton on the reacting species; returns their concentrations at the end of the step and the events of it."""
         reactions, cells, theta = self.reactions, self.coverage.cells, self.coverage.theta
         matrices, newton = self._matrices(operators, dt), self._newton
-        storage = reactions.gas_volume / dt
-        diagonal = newton.set_fluxes(operators) + storage
-        rhs = storage * old + supply
+        newton.set_fluxes(matrices)
+        diagonal = np.stack([matrix.diagonal for matrix in matrices])
+        rhs = reactions.gas_volume / dt * old + supply
         closed = isinstance(reactions.surface, SurfaceKinetics)
         held = 0.0 if closed else TURNED * self.coverage.capacity.sum() / dt
         new = possible(foreseen, old)
         self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
-        for iteration in range(NEWTON_LIMIT):
+        for _ in range(NEWTON_LIMIT):
             rates, slopes = reactions.surface.rates(new[:, cells], theta, dt)
             gas_rates, gas_slopes = reactions.gas.rates(new)
             events = reactions.events(rates, gas_rates)
@@ -263,7 +261,7 @@ class Transport:
             blocks = -reactions.slopes(slopes, gas_slopes)
             for i in range(self.coupled):
                 blocks[:, i, i] += diagonal[i]
-            new = new - newton.solve(blocks, residual, forcing(at.worst), first=iteration == 0)
+            new = new - newton.solve(blocks, residual, forcing(at.worst))
             if at.worst > BALANCED and closed:
                 self._balance(new, matrices, diagonal, rhs, dt)
         raise ConvergenceError(

@@ -1,0 +1,70 @@
+"""C beside the Python that calls it, compiled when it is first used and kept with the compiled forms."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sysconfig
+import tempfile
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+import cffi
+from numpy.typing import NDArray
+
+from mpm.arrays import Floats
+from mpm.numerics.fem import cache_directory, cannot_compile
+from mpm.parallel import on_root
+
+from mpi4py import MPI  # isort: skip  (after the finite-element stack)
+
+FLAGS = ["-O3", "-fno-math-errno", "-ffp-contract=fast", "-fopenmp-simd"]
+_BUILDER = cffi.FFI()
+_loaded: dict[tuple[Path, tuple[tuple[str, int], ...]], Any] = {}
+
+
+def compiled(comm: MPI.Comm, source: Path, declarations: str, **constants: int) -> Any:
+    """The functions that `declarations` name, of the C `source` with these `constants` for the preprocessor; collective.
+
+    Rank 0 compiles, once for each set of constants, beside and then renames; all ranks share that file system, as they do for forms.
+    Raises InputError where nothing can be compiled.
+    """
+    known = source, tuple(sorted(constants.items()))
+    if known not in _loaded:
+        _loaded[known] = _load(comm, source, declarations, constants)
+    return _loaded[known]
+
+
+def _load(comm: MPI.Comm, source: Path, declarations: str, constants: dict[str, int]) -> Any:
+    text = "".join(f"#define {name} {value}\n" for name, value in constants.items()) + source.read_text()
+    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    made_of = repr((text, declarations, FLAGS, cffi.__version__, suffix))
+    name = f"{source.stem}_{hashlib.sha256(made_of.encode()).hexdigest()[:16]}"
+    library = cache_directory() / "compiled" / f"{name}{suffix}"
+
+    def build() -> None:
+        if library.exists():
+            return
+        builder = cffi.FFI()
+        builder.cdef(declarations)
+        builder.set_source(name, text, extra_compile_args=FLAGS)
+        try:
+            library.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=library.parent) as beside:
+                os.replace(builder.compile(tmpdir=beside), library)
+        except (OSError, cffi.VerificationError) as error:
+            raise cannot_compile(error) from error
+
+    on_root(comm, build)
+    spec = spec_from_file_location(name, library)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{library} is no library")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.lib
+
+
+def pointer(values: Floats | NDArray[Any]) -> Any:
+    """What C takes for a contiguous array of float64."""
+    return _BUILDER.from_buffer("double[]", values)

@@ -1,0 +1,147 @@
+"""The matrix of one time step of what spreads alike, storage/dt + fluxes, and its solvers."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from mpm.arrays import Floats
+from mpm.mesh.strip import Strip
+from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver
+from mpm.numerics.linear import ServingSolver
+from mpm.parallel import largest, total
+from mpm.transport.cell_matrix import CellMatrix
+from mpm.transport.fluxes import FluxOperator
+
+# ranks on which solving the whole system on each with a complete factor takes no longer than iterating together
+FEW = 2
+FALL = 1e-13  # of a right-hand side, where that is not below what a step may leave before
+FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
+NEVER = -1  # version of no operator
+TRACE = 1e-10  # of what there is: what a step may leave of a species that is there in traces, which balance to 1e-9, too
+
+
+class BoxFluxes:
+    """Where the fluxes of operators on a strip are in a BoxMatrix."""
+
+    def __init__(self, strip: Strip):
+        faces, own = strip.faces, strip.owned
+        across, alone = ~faces.vertical_flow, faces.behind == faces.ahead
+        left, right = (AFTER, BEFORE) if strip.box.leftwards else (BEFORE, AFTER)
+        numbers = np.arange(len(faces.behind))
+        # of each coupling its place among what faces take from behind, then from ahead, then a zero
+        self._places = np.full((4, own), 2 * len(numbers))
+        for side, cell, between in (
+            (left, faces.ahead, across),
+            (right, faces.behind, across),
+            (BELOW, faces.ahead, faces.vertical_flow),
+            (ABOVE, faces.behind, faces.vertical_flow),
+        ):
+            mine = numbers[between & ~alone & (cell < own)]
+            self._places[side, cell[mine]] = mine + (len(numbers) if cell is faces.behind else 0)
+        # of the one column of a strip that is closed: what leaves a cell to the right comes back from the left
+        self._alone, self._returned = numbers[alone], faces.behind[alone]
+
+    def couplings(self, operator: FluxOperator) -> Floats:
+        """Of a BoxMatrix, (4, own) [m2/s]."""
+        taken = np.concatenate([operator.from_behind, operator.from_ahead, [0.0]])
+        return np.asarray(-taken[self._places])
+
+    def outflow(self, operator: FluxOperator) -> Floats:
+        """What leaves each own cell per concentration, (own,) [m2/s]."""
+        if not len(self._alone):
+            return operator.outflow
+        returned = (operator.from_behind + operator.from_ahead)[self._alone]
+        return operator.outflow - np.bincount(self._returned, returned, len(operator.outflow))
+
+
+class StepMatrix:
+    """storage/dt + fluxes for what spreads alike, with the solvers that go with it.
+
+    Stored are species, in the volume of the gas, unless `update` says otherwise. A solution leaves a sum of |residual| over all cells below
+    `residual` [mol/m/s], or `fall` of that of the right-hand side.
+    """
+
+    def __init__(self, strip: Strip, name: str, residual: float, fall: float = FALL):
+        self.strip, self.name = strip, name
+        self.matrix = BoxMatrix(strip.box, 1)
+        self.version = NEVER  # of the operator
+        self._fluxes, self._dt = BoxFluxes(strip), 0.0
+        self._residual, self._fall = residual / np.sqrt(max(strip.grid.cells, 1)), fall
+        self._heaviest = 0.0  # entry of the diagonal
+        self._factorised = False
+        self._serving: Serving | None = None  # once the matrix recurs
+
+    @cached_property
+    def _krylov(self) -> BoxSolver:
+        return BoxSolver(self.matrix, self.name)
+
+    @property
+    def couplings(self) -> Floats:
+        """Of the operator, (4, own) [m2/s]."""
+        return np.asarray(self.matrix.couplings[0])
+
+    @property
+    def diagonal(self) -> Floats:
+        """(own,) [m2/s], a view."""
+        return self.matrix.blocks[:, 0, 0]
+
+    def update(self, operator: FluxOperator, dt: float, storage: Floats | None = None) -> None:
+        """Make it the matrix of `operator` over a step of `dt` [s], infinite for the steady one.
+
+        `storage` (own,) [m2] goes with the version of the operator; left out: the volume of the gas.
+        """
+        if (self.version, self._dt) == (operator.version, dt):
+            return
+        if self.version != operator.version:
+            self.matrix.couplings[0] = self._fluxes.couplings(operator)
+        held = self.strip.gas_volume[: self.strip.owned] if storage is None else storage
+        self.diagonal[:] = self._fluxes.outflow(operator) + held / dt
+        self.version, self._dt, self._operator = operator.version, dt, operator
+        self._heaviest = float(largest(self.strip.comm, [self.diagonal.max(initial=0.0)])[0])
+        self._factorised = False
+
+    def multiply(self, values: Floats) -> Floats:
+        """The product with own `values`, (own,); collective."""
+        return np.asarray(self.matrix.multiply(values[None])[0])
+
+    def solve(self, rhs: Floats, guess: Floats, recurs: bool = False) -> Floats:
+        """From own values `guess` to the solution, (own,); collective. Raises ConvergenceError.
+
+        Where the matrix `recurs`, step after step, with a complete factor of it that is kept, on a FEW ranks.
+        """
+        if recurs and self.strip.comm.size <= FEW:
+            self._serving = self._serving or Serving(self.strip, self.name)
+            return self._serving.solve(self._operator, self.diagonal, rhs, (self.version, self._dt))
+        size = float(np.sqrt(total(self.strip.comm, [((rhs / self.diagonal) ** 2).sum()])[0]))
+        if size == 0.0:
+            return np.zeros_like(rhs)
+        if not self._factorised:
+            self._krylov.factorise()
+            self._factorised = True
+        least = max(self._residual / self._heaviest, self._fall * size)
+        if self._fall == FALL_HEATED:
+            least = min(least, TRACE * size)
+        missing = rhs - self.multiply(guess)
+        return np.asarray(guess + self._krylov.solve(missing[None], 0.0, least)[0][0])
+
+
+class Serving:
+    """A complete factor of a matrix that recurs, step after step."""
+
+    def __init__(self, strip: Strip, name: str):
+        self._cells = CellMatrix(strip, 1)
+        self._solver = ServingSolver(self._cells.matrix, name)
+        self._right, self._found = self._cells.matrix.createVecs()
+        self._holds: object = None
+
+    def solve(self, operator: FluxOperator, diagonal: Floats, rhs: Floats, version: object) -> Floats:
+        """With the matrix of `operator` and this `diagonal`, whose `version` tells when it is another one; collective."""
+        if self._holds != version:
+            self._cells.set_fluxes([operator])
+            self._cells.assemble(diagonal)
+            self._holds = version
+        self._right.array[:] = rhs
+        self._solver.solve(self._right, self._found, version)
+        return np.array(self._found.array)

@@ -1,0 +1,141 @@
+"""The box of a rank, matrices over it and their solver, against dense algebra; on any number of ranks."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mpm.errors import ConvergenceError
+from mpm.numerics.box import Box, column_owners
+from mpm.numerics.box_matrix import AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver, Factor
+
+from mpi4py import MPI  # isort: skip  (after fem)
+
+WORLD = MPI.COMM_WORLD
+SHAPES = [(1, 1), (1, 5), (4, 1), (5, 2), (3, 3), (6, 8)]
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 7])
+@pytest.mark.parametrize("columns", [1, 2, 3, 20])
+def test_columns_are_shared_out(ranks: int, columns: int) -> None:
+    """Fails when a column has no rank, a rank's columns lie apart, or one has two more than another that has some."""
+    owners = column_owners(columns, ranks)
+    counts = np.bincount(owners, minlength=ranks)
+    assert np.all(np.diff(owners) >= 0)
+    assert counts.sum() == columns
+    assert np.count_nonzero(counts) == min(columns, ranks)
+    assert counts[counts > 0].max() - counts[counts > 0].min() <= 1
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize(("rows", "columns"), SHAPES)
+@pytest.mark.parallel
+def test_seams_fit(rows: int, columns: int, closed: bool) -> None:
+    """Fails when two ranks do not agree on who is at a seam, at which side and who is earlier, or a seam joins what are no neighbours."""
+    box = Box(WORLD, rows, columns, closed)
+    everyone = WORLD.allgather((box.seams, box.columns))
+    for rank, (seams, mine) in enumerate(everyone):
+        for side, seam in enumerate(seams):
+            if seam is None:
+                continue
+            there, theirs = everyone[seam.rank]
+            back = there[seam.side]
+            assert (back.rank, back.side, back.earlier) == (rank, side, not seam.earlier)
+            apart = abs(int(mine[(0, -1)[side]]) - int(theirs[(0, -1)[seam.side]]))
+            assert apart == 1 or (closed and apart == columns - 1)
+    joined = sum(seam is not None for seams, _ in everyone for seam in seams)
+    busy = min(WORLD.size, columns)
+    assert joined == 2 * (busy - 1) + (2 if closed and columns > 1 else 0)
+
+
+def random_matrix(
+    rows: int, columns: int, unknowns: int, closed: bool, mutual: float, storage: float = 1.0
+) -> tuple[BoxMatrix, NDArray[np.float64], NDArray[np.intp]]:
+    """An M-matrix of fluxes and storage, the same as a dense one over (unknown, column, row), and where this rank's are in that."""
+    draw = np.random.default_rng(5)
+    cells = rows * columns
+    dense = np.zeros((unknowns, cells, unknowns, cells))
+    box = Box(WORLD, rows, columns, closed)
+    place = {int(c): k for k, c in enumerate(box.columns)}
+    matrix = BoxMatrix(box, unknowns)
+    left, right = (AFTER, BEFORE) if box.leftwards else (BEFORE, AFTER)
+
+    def couple(i: int, behind: tuple[int, int], ahead: tuple[int, int], sides: tuple[int, int]) -> None:
+        """A flux a C_behind - b C_ahead; `sides` are those at which the cell ahead and the one behind have each other."""
+        for here, other, side in ((ahead, behind, sides[0]), (behind, ahead, sides[1])):
+            a = draw.random()
+            k, m = (c * rows + r for c, r in (here, other))
+            dense[i, k, i, m] -= a
+            dense[i, m, i, m] += a
+            if here[0] in place:
+                matrix.couplings[i, side, place[here[0]] * rows + here[1]] = -a
+
+    for i in range(unknowns):
+        for c in range(columns):
+            for r in range(rows):
+                if r + 1 < rows:
+                    couple(i, (c, r), (c, r + 1), (BELOW, BELOW + 1))
+                if c + 1 < columns:
+                    couple(i, (c, r), (c + 1, r), (left, right))
+                elif closed and columns > 1:
+                    couple(i, (c, r), (0, r), (left, right))
+    for k in range(cells):
+        dense[:, k, :, k] += mutual * (draw.random((unknowns, unknowns)) - 0.5)
+        dense[:, k, :, k] += np.diag(storage * (0.2 + draw.random(unknowns)) + mutual * unknowns)
+    own = np.array([c * rows + r for c in box.columns for r in range(rows)], dtype=np.intp)
+    matrix.blocks[:] = dense[:, own, :, own]
+    return matrix, dense.reshape(unknowns * cells, -1), own
+
+
+@pytest.mark.parametrize("mutual", [0.0, 2.0])
+@pytest.mark.parametrize("unknowns", [1, 2, 3])
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize(("rows", "columns"), SHAPES)
+@pytest.mark.parallel
+def test_against_dense_algebra(rows: int, columns: int, closed: bool, unknowns: int, mutual: float) -> None:
+    """Fails when a product or a solution is not that of the whole matrix, with one factor for all unknowns or one for each."""
+    matrix, dense, own = random_matrix(rows, columns, unknowns, closed, mutual)
+    x = np.random.default_rng(6).standard_normal((unknowns, rows * columns))
+    rhs = (dense @ x.ravel()).reshape(x.shape)
+    np.testing.assert_allclose(matrix.multiply(x[:, own]), rhs[:, own], atol=1e-12)
+    solver = BoxSolver(matrix, "a test")
+    for together in (False, True):
+        solver.factorise(together)
+        found, iterations = solver.solve(rhs[:, own], 1e-12)
+        np.testing.assert_allclose(found, x[:, own], atol=1e-9)
+        assert iterations < 40
+    exact = np.linalg.norm(x)
+    found, _ = solver.solve(rhs[:, own], 0.0, 1e9 * exact)
+    np.testing.assert_array_equal(found, 0.0)  # what may be left is more than all
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parallel
+def test_the_factor_is_one_of_the_whole_matrix(closed: bool) -> None:
+    """Fails when the factor leaves out what couples ranks: of one row it is exact, unless that
+    is closed or has a rank that others come before at both sides."""
+    matrix, dense, own = random_matrix(1, 11, 2, closed, 1.0)
+    x = np.random.default_rng(7).standard_normal((2, 11))
+    rhs = (dense @ x.ravel()).reshape(x.shape)[:, own]
+    solver = BoxSolver(matrix, "a test")
+    solver.factorise(together=True)
+    found, iterations = solver.solve(rhs, 1e-11)
+    np.testing.assert_allclose(found, x[:, own], atol=1e-8)
+    assert iterations <= (6 if closed or WORLD.size > 2 else 1)
+
+
+@pytest.mark.parallel
+def test_pivots_are_positive() -> None:
+    """Fails when the relaxed factor of fluxes with next to no storage has a pivot that is not above zero."""
+    matrix, _, _ = random_matrix(7, 9, 1, True, 0.0, storage=1e-9)
+    factor = Factor(matrix.box, 1)
+    factor.renew(matrix.couplings, matrix.blocks)
+    assert np.all(factor.inverse > 0.0)
+
+
+def test_what_does_not_converge() -> None:
+    """Fails when a system without a solution ends as solved."""
+    matrix = BoxMatrix(Box(MPI.COMM_SELF, 3, 4, True), 1)
+    solver = BoxSolver(matrix, "a test")
+    solver.factorise()
+    with pytest.raises(ConvergenceError, match="a test: the linear solver stopped"):
+        solver.solve(np.ones((1, 12)), 1e-9)
