@@ -315,17 +315,7 @@ def test_no_number_is_written_that_is_none(monkeypatch: pytest.MonkeyPatch, tmp_
     assert all(np.isfinite(values).all() for values in found.history.values())
 
 
-@pytest.mark.parallel(alone=False)
-def test_a_rank_without_a_part_of_the_bed() -> None:
-    """Fails (by timeout) when ranks wait for one that holds nothing of the moving bed, as under a high headspace."""
-    changes = {"geometry.layer.headspace.cells": 20, "geometry.layer.bed.cells": 1}
-    case = zone({**STEADY, "geometry.layer.headspace.height": "60 mm"}, {**TINY, **changes})
-    reactor, _ = run(case, MPI.COMM_WORLD)
-    mine = int(np.isin(reactor.system.coverage.place, reactor.system.coverage.moving_rows).sum())
-    assert MPI.COMM_WORLD.allreduce(mine, op=MPI.MIN) == 0, "every rank has some; another mesh would test it"
-
-
-GAS_ONLY = {
+GAS_ONLY: dict[str, Any] = {
     "fidelity": "steady",
     "geometry": {
         "length": "60 mm",
@@ -344,6 +334,28 @@ GAS_ONLY = {
         "outlet": [{"name": "o", "center": "55 mm", "width": "4 mm"}],
     },
 }
+
+
+@pytest.mark.parametrize("fidelity", ["steady", "averaged", "resolved"])
+@pytest.mark.parallel(alone=False)
+def test_a_rank_without_cells(fidelity: str) -> None:
+    """Fails (by timeout) when ranks wait for one that holds nothing, as of a strip with fewer columns than ranks, or its numbers are not
+    those of one rank."""
+    columns = MPI.COMM_WORLD.size - 1
+    geometry = {
+        **GAS_ONLY["geometry"],
+        "cell_width": f"{60 / columns!r} mm",
+        "inlet": [
+            {**GAS_ONLY["geometry"]["inlet"][0], "center": "30 mm", "width": "20 mm", "side": "bottom"}
+        ],
+        "outlet": [{"name": "o", "center": "30 mm", "width": "60 mm", "side": "top"}],
+    }
+    case = load_case({**GAS_ONLY, "geometry": geometry, "fidelity": fidelity}, SHORT)
+    reactor, result = run(case, MPI.COMM_WORLD)
+    assert reactor.grid.columns == columns
+    assert min(MPI.COMM_WORLD.allgather(reactor.system.strip.owned)) == 0
+    _, alone = run(case, MPI.COMM_SELF)
+    assert_same_numbers(result.summary, alone.summary, 1e-8)
 
 
 @pytest.mark.parallel

@@ -36,101 +36,183 @@ static inline void invert(double *a)
     }
 }
 
+/* What pivots are found from and what is kept of them. */
+typedef struct {
+    int rows, columns;
+    long cells;
+    double relaxed;
+    const double *couplings, *blocks, *from_start, *from_end;
+    double *inverse, *excess, *swept;
+} Pivots;
+
+static inline __attribute__((always_inline)) void cell_pivot(const Pivots *s, int column, int row)
+{
+    const double *couplings = s->couplings, *blocks = s->blocks, *inverse = s->inverse;
+    const int rows = s->rows;
+    const long cells = s->cells, k = (long)column * rows + row;
+    double pivot[BLOCK], into[UNKNOWNS];
+    EACH(i) EACH(j) IN(pivot, 0, i, j) = IN(blocks, k, i, j);
+    if (column > 0) {
+        EACH(i) into[i] = COUPLING(BEFORE, i, k) + (row < rows - 1 ? s->relaxed * COUPLING(BELOW, i, k - rows + 1) : 0.0);
+        EACH(i) EACH(j) IN(pivot, 0, i, j) -= into[i] * COUPLING(AFTER, j, k - rows) * IN(inverse, k - rows, i, j);
+    } else {
+        EACH(i) EACH(j) IN(pivot, 0, i, j) -= COUPLING(BEFORE, i, k) * IN(s->from_start, row, i, j);
+    }
+    if (column == s->columns - 1)
+        EACH(i) EACH(j) IN(pivot, 0, i, j) -= COUPLING(AFTER, i, k) * IN(s->from_end, row, i, j);
+    if (row > 0) {
+        EACH(i) into[i] = COUPLING(BELOW, i, k) + (column < s->columns - 1 ? s->relaxed * COUPLING(BEFORE, i, k - 1 + rows) : 0.0);
+        EACH(i) EACH(j) IN(pivot, 0, i, j) -= into[i] * COUPLING(ABOVE, j, k - 1) * IN(inverse, k - 1, i, j);
+    }
+    invert(pivot);
+    EACH(i) EACH(j) {
+        double product = i == j ? -2.0 : 0.0;
+        EACH(l) product += IN(pivot, 0, i, l) * IN(blocks, k, l, j);
+        IN(s->excess, k, i, j) = product;
+        IN(s->inverse, k, i, j) = IN(pivot, 0, i, j);
+    }
+#if UNKNOWNS == 1
+    for (int which = 0; which < 4; ++which)
+        s->swept[which * cells + k] = pivot[0] * COUPLING(which, 0, k);
+#endif
+}
+
 /* P^-1, H = P^-1 D - 2 (`excess`) and, of one unknown, couplings times P^-1 (`swept`) in the columns from `first` to before `end`;
-   `from_start`, `from_end`: what neighbours add to pivots of the first and the last column. */
+   `from_start`, `from_end`: what neighbours add to pivots of the first and the last column.
+   Two columns at a time, the second one row behind the first: a processor has both under way while either waits for itself. */
 FAST void find_pivots(int rows, int columns, int first, int end, double relaxed, const double *couplings, const double *blocks,
                       const double *from_start, const double *from_end, double *inverse, double *excess, double *swept)
 {
-    const long cells = (long)rows * columns;
-    for (int column = first; column < end; ++column) {
-        for (int row = 0; row < rows; ++row) {
-            const long k = (long)column * rows + row;
-            double pivot[BLOCK], into[UNKNOWNS];
-            EACH(i) EACH(j) IN(pivot, 0, i, j) = IN(blocks, k, i, j);
-            if (column > 0) {
-                EACH(i) into[i] = COUPLING(BEFORE, i, k) + (row < rows - 1 ? relaxed * COUPLING(BELOW, i, k - rows + 1) : 0.0);
-                EACH(i) EACH(j) IN(pivot, 0, i, j) -= into[i] * IN(inverse, k - rows, i, j) * COUPLING(AFTER, j, k - rows);
-            } else {
-                EACH(i) EACH(j) IN(pivot, 0, i, j) -= COUPLING(BEFORE, i, k) * IN(from_start, row, i, j);
+    const Pivots s = {rows, columns, (long)rows * columns, relaxed, couplings, blocks, from_start, from_end, inverse, excess, swept};
+    int column = first;
+    for (; column < end - 1; column += 2)
+        for (int row = 0; row <= rows; ++row) {
+            if (row > 0)
+                cell_pivot(&s, column + 1, row - 1);
+            if (row < rows)
+                cell_pivot(&s, column, row);
+        }
+    if (column == end - 1)
+        for (int row = 0; row < rows; ++row)
+            cell_pivot(&s, column, row);
+}
+
+/* What sweeps go through, and how far it is from one unknown to the next. */
+typedef struct {
+    long cells, width;
+    const double *couplings, *inverse, *excess, *y;
+    double *x, *result;
+} Sweep;
+
+/* `last` becomes there - P^-1 sum where `there` and all of `sum` but the term from `last` are known. */
+static inline __attribute__((always_inline)) void settle(const Sweep *s, long k, int towards, const double *there, double *sum, double *last)
+{
+    const double *couplings = s->couplings;
+    const long cells = s->cells;
+#if UNKNOWNS == 1
+    last[0] = (there[0] - sum[0]) - COUPLING(towards, 0, k) * last[0];
+#else
+    EACH(i) sum[i] += COUPLING(towards, i, k) * last[i];
+    EACH(i) {
+        last[i] = there[i];
+        EACH(j) last[i] -= IN(s->inverse, k, i, j) * sum[j];
+    }
+#endif
+}
+
+/* x of cell k = y - P^-1 U x: `across` is that of the column after it, `last` that above it, then its own. */
+static inline __attribute__((always_inline)) void cell_back(const Sweep *s, long k, int rows, int to_start, const double *across,
+                                                            double *last)
+{
+    const double *couplings = s->couplings;
+    const long cells = s->cells, at = k + rows;
+    double sum[UNKNOWNS], there[UNKNOWNS];
+    EACH(i) sum[i] = COUPLING(AFTER, i, k) * across[i];
+    if (to_start)
+        EACH(i) sum[i] += COUPLING(BEFORE, i, k) * s->x[i * s->width + at - rows];
+    EACH(i) there[i] = s->y[i * cells + k];
+    settle(s, k, ABOVE, there, sum, last);
+    EACH(i) s->x[i * s->width + at] = last[i];
+}
+
+/* f of cell k = y + H x - P^-1 L f: `across` is that of the column before it, `last` that below it, then its own; `beyond` that of a
+   neighbour after it, or NULL. */
+static inline __attribute__((always_inline)) void cell_on(const Sweep *s, long k, int rows, const double *beyond, const double *across,
+                                                          double *last)
+{
+    const double *couplings = s->couplings;
+    const long cells = s->cells, at = k + rows;
+    double sum[UNKNOWNS], there[UNKNOWNS];
+    EACH(i) sum[i] = COUPLING(BEFORE, i, k) * across[i];
+    if (beyond)
+        EACH(i) sum[i] += COUPLING(AFTER, i, k) * beyond[i * rows];
+    EACH(i) {
+        there[i] = s->y[i * cells + k];
+        EACH(j) there[i] += IN(s->excess, k, i, j) * s->x[j * s->width + at];
+    }
+    settle(s, k, BELOW, there, sum, last);
+    EACH(i) s->result[i * cells + k] = s->x[i * s->width + at] + last[i];
+}
+
+/* x = y - P^-1 U x from column end-1 down to `first`; `to_start`: column `first` is coupled to a neighbour whose values x holds.
+   Two columns at a time, as above. */
+FAST void sweep_back(int rows, int columns, int first, int end, int to_start, const double *couplings, const double *inverse,
+                     const double *y, double *x)
+{
+    const long cells = (long)rows * columns, width = cells + 2 * rows;
+    const Sweep s = {cells, width, couplings, inverse, 0, y, x, 0};
+    int column = end - 1;
+    for (; column > first; column -= 2) {
+        double one[UNKNOWNS] = {0.0}, two[UNKNOWNS] = {0.0}, across[UNKNOWNS];
+        const long start = (long)column * rows, next = start - rows;
+        for (int row = rows - 1; row >= -1; --row) {
+            if (row < rows - 1)
+                cell_back(&s, next + row + 1, rows, 0, one, two);
+            if (row >= 0) {
+                EACH(i) across[i] = x[i * width + start + row + 2 * rows];
+                cell_back(&s, start + row, rows, 0, across, one);
             }
-            if (column == columns - 1)
-                EACH(i) EACH(j) IN(pivot, 0, i, j) -= COUPLING(AFTER, i, k) * IN(from_end, row, i, j);
+        }
+    }
+    if (column == first) {
+        double one[UNKNOWNS] = {0.0}, across[UNKNOWNS];
+        const long start = (long)column * rows;
+        for (int row = rows - 1; row >= 0; --row) {
+            EACH(i) across[i] = x[i * width + start + row + 2 * rows];
+            cell_back(&s, start + row, rows, to_start, across, one);
+        }
+    }
+}
+
+/* f = y + H x - P^-1 L f from column `first` to before `end`, and x + f to `result`. `f` (UNKNOWNS, rows) holds the column before, then the
+   last one; `beyond` (UNKNOWNS, rows) that of a neighbour to which column end-1 is coupled, or NULL. Two columns at a time, as above. */
+FAST void sweep_on(int rows, int columns, int first, int end, const double *couplings, const double *inverse, const double *excess,
+                   const double *beyond, const double *y, double *x, double *f, double *result)
+{
+    const long cells = (long)rows * columns, width = cells + 2 * rows;
+    const Sweep s = {cells, width, couplings, inverse, excess, y, x, result};
+    int column = first;
+    for (; column < end - 1; column += 2) {
+        double one[UNKNOWNS] = {0.0}, two[UNKNOWNS] = {0.0}, across[UNKNOWNS];
+        const long start = (long)column * rows, next = start + rows;
+        for (int row = 0; row <= rows; ++row) {
             if (row > 0) {
-                EACH(i) into[i] = COUPLING(BELOW, i, k) + (column < columns - 1 ? relaxed * COUPLING(BEFORE, i, k - 1 + rows) : 0.0);
-                EACH(i) EACH(j) IN(pivot, 0, i, j) -= into[i] * COUPLING(ABOVE, j, k - 1) * IN(inverse, k - 1, i, j);
+                cell_on(&s, next + row - 1, rows, 0, one, two);
+                EACH(i) f[i * rows + row - 1] = two[i];
             }
-            invert(pivot);
-            EACH(i) EACH(j) {
-                double product = i == j ? -2.0 : 0.0;
-                EACH(l) product += IN(pivot, 0, i, l) * IN(blocks, k, l, j);
-                IN(excess, k, i, j) = product;
-                IN(inverse, k, i, j) = IN(pivot, 0, i, j);
+            if (row < rows) {
+                EACH(i) across[i] = f[i * rows + row];
+                cell_on(&s, start + row, rows, 0, across, one);
             }
-#if UNKNOWNS == 1
-            for (int which = 0; which < 4; ++which)
-                swept[which * cells + k] = pivot[0] * COUPLING(which, 0, k);
-#endif
         }
     }
-}
-
-/* x = y - P^-1 U x from column end-1 down to `first`; `to_start`: column `first` is coupled to a neighbour whose values x holds. */
-FAST void sweep_back(int rows, int columns, int first, int end, int to_start, const double *restrict couplings,
-                     const double *restrict inverse, const double *restrict y, double *restrict x)
-{
-    const long cells = (long)rows * columns, width = cells + 2 * rows;
-    double last[UNKNOWNS];
-    EACH(i) last[i] = x[i * width + (long)(end + 1) * rows];
-    for (long k = (long)end * rows - 1; k >= (long)first * rows; --k) {
-        const long at = k + rows;
-        double sum[UNKNOWNS];
-        EACH(i) sum[i] = COUPLING(AFTER, i, k) * x[i * width + at + rows];
-        if (to_start)
-            EACH(i) sum[i] += COUPLING(BEFORE, i, k) * x[i * width + at - rows];
-#if UNKNOWNS == 1
-        last[0] = (y[k] - sum[0]) - COUPLING(ABOVE, 0, k) * last[0];
-#else
-        EACH(i) sum[i] += COUPLING(ABOVE, i, k) * last[i];
-        EACH(i) {
-            last[i] = y[i * cells + k];
-            EACH(j) last[i] -= IN(inverse, k, i, j) * sum[j];
-        }
-#endif
-        EACH(i) x[i * width + at] = last[i];
-    }
-}
-
-/* f = y + H x - P^-1 L f from column `first` to before `end`, and x + f to `result`; `to_end`: column end-1 is coupled to
-   a neighbour whose values f holds. */
-FAST void sweep_on(int rows, int columns, int first, int end, int to_end, const double *restrict couplings,
-                   const double *restrict inverse, const double *restrict excess, const double *restrict y, const double *restrict x,
-                   double *restrict f, double *restrict result)
-{
-    const long cells = (long)rows * columns, width = cells + 2 * rows;
-    double last[UNKNOWNS];
-    EACH(i) last[i] = f[i * width + (long)(first + 1) * rows - 1];
-    for (long k = (long)first * rows; k < (long)end * rows; ++k) {
-        const long at = k + rows;
-        double sum[UNKNOWNS], there[UNKNOWNS];
-        EACH(i) sum[i] = COUPLING(BEFORE, i, k) * f[i * width + at - rows];
-        if (to_end)
-            EACH(i) sum[i] += COUPLING(AFTER, i, k) * f[i * width + at + rows];
-        EACH(i) {
-            there[i] = y[i * cells + k];
-            EACH(j) there[i] += IN(excess, k, i, j) * x[j * width + at];
-        }
-#if UNKNOWNS == 1
-        last[0] = (there[0] - sum[0]) - COUPLING(BELOW, 0, k) * last[0];
-#else
-        EACH(i) sum[i] += COUPLING(BELOW, i, k) * last[i];
-        EACH(i) {
-            last[i] = there[i];
-            EACH(j) last[i] -= IN(inverse, k, i, j) * sum[j];
-        }
-#endif
-        EACH(i) {
-            f[i * width + at] = last[i];
-            result[i * cells + k] = x[i * width + at] + last[i];
+    if (column == end - 1) {
+        double one[UNKNOWNS] = {0.0}, across[UNKNOWNS];
+        const long start = (long)column * rows;
+        for (int row = 0; row < rows; ++row) {
+            EACH(i) across[i] = f[i * rows + row];
+            cell_on(&s, start + row, rows, beyond ? beyond + row : 0, across, one);
+            EACH(i) f[i * rows + row] = one[i];
         }
     }
 }

@@ -22,7 +22,7 @@ import numpy as np
 from mpm.arrays import Floats, Ints
 from mpm.numerics.bicgstab import BiCGStab
 from mpm.numerics.box import END, START, Box
-from mpm.numerics.compiled import compiled, pointer
+from mpm.numerics.compiled import NOTHING, compiled, pointer
 
 RELAXED = 0.97  # 1 would need sums of columns above zero; from 0.9 on the number of iterations hardly changes
 SOURCE = Path(__file__).with_name("box_matrix.c")
@@ -31,8 +31,8 @@ void find_pivots(int rows, int columns, int first, int end, double relaxed, cons
                  const double *from_start, const double *from_end, double *inverse, double *excess, double *swept);
 void sweep_back(int rows, int columns, int first, int end, int to_start, const double *couplings, const double *inverse,
                 const double *y, double *x);
-void sweep_on(int rows, int columns, int first, int end, int to_end, const double *couplings, const double *inverse,
-              const double *excess, const double *y, const double *x, double *f, double *result);
+void sweep_on(int rows, int columns, int first, int end, const double *couplings, const double *inverse, const double *excess,
+              const double *beyond, const double *y, double *x, double *f, double *result);
 void multiply(int rows, int columns, const double *couplings, const double *blocks, const double *x, double *result);
 """
 BEFORE, AFTER, BELOW, ABOVE = range(4)
@@ -52,9 +52,9 @@ class BoxMatrix:
         self._c = kernels(box, unknowns)
         self._x = BoxVector(box, unknowns)
 
-    def multiply(self, x: Floats) -> Floats:
-        """A x; collective."""
-        box, result = self.box, np.empty((self.unknowns, self.box.cells))
+    def multiply(self, x: Floats, result: Floats) -> None:
+        """A x to `result`; collective."""
+        box = self.box
         self._x.own[:] = x
         for side in box.sides:
             box.give(side, self._x.column[side])
@@ -62,7 +62,6 @@ class BoxMatrix:
             box.take(side, self._x.beyond[side])
         box.finish()
         self._c.multiply(*box.shape, *map(pointer, (self.couplings, self.blocks, self._x.all, result)))
-        return result
 
 
 class BoxVector:
@@ -87,7 +86,8 @@ class Factor:
         self._excess = np.zeros_like(self.inverse)  # P^-1 D - 2
         self._swept = np.zeros((1, 4, box.cells if unknowns == 1 else 0))  # couplings times P^-1
         self._couplings = self._swept  # that sweeps take
-        self.x, self._f, self._nothing = (BoxVector(box, unknowns) for _ in range(3))
+        self.x, self._nothing = (BoxVector(box, unknowns) for _ in range(2))
+        self._column, self._beyond = (np.zeros((unknowns, box.rows)) for _ in range(2))
 
     def renew(self, couplings: Floats, blocks: Floats) -> None:
         """Find P for these, as in BoxMatrix; collective."""
@@ -139,17 +139,19 @@ class Factor:
         self._on(y, self._nothing, result)
 
     def _on(self, y: Floats, x: BoxVector, result: Floats) -> None:
-        box, f = self.box, self._f
-        arrays = [pointer(a) for a in (self._couplings, self.inverse, self._excess, y, x.all, f.all, result)]
+        box, column, beyond = self.box, self._column, self._beyond
+        fixed = [pointer(a) for a in (self._couplings, self.inverse, self._excess)]
+        arrays = [pointer(a) for a in (y, x.all, column, result)]
+        column[:] = 0.0
         for first, end, sides in box.pieces:
             for side in sides:
                 if box.seam(side).earlier:
-                    box.take(side, f.beyond[side])
+                    box.take(side, (column, beyond)[side])
             to_end = END in sides and box.seam(END).earlier
-            self._c.sweep_on(*box.shape, first, end, to_end, *arrays)
+            self._c.sweep_on(*box.shape, first, end, *fixed, pointer(beyond) if to_end else NOTHING, *arrays)
             for side in sides:
                 if not box.seam(side).earlier:
-                    box.give(side, f.column[side])
+                    box.give(side, column)
         box.finish()
 
 

@@ -21,6 +21,7 @@ from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
 FLAGS = ["-O3", "-fno-math-errno", "-ffp-contract=fast", "-fopenmp-simd"]
 _BUILDER = cffi.FFI()
+NOTHING = _BUILDER.NULL
 _loaded: dict[tuple[Path, tuple[tuple[str, int], ...]], Any] = {}
 
 

@@ -108,8 +108,11 @@ class Reactions:
 
     def made(self, events: Events, species: slice = slice(None)) -> Floats:
         """What they make of every one of these species, (species, own) [mol/m/s]."""
-        # of one reaction thrice as fast as a product of matrices
-        made = np.asarray(np.einsum("ri,rn->in", self._nu_gas[:, species], events.gas))
+        nu = self._nu_gas[:, species]
+        if len(nu):  # of one reaction thrice as fast as a product of matrices
+            made = np.asarray(np.einsum("ri,rn->in", nu, events.gas))
+        else:
+            made = np.zeros((nu.shape[1], self.strip.owned))
         made[:, self.coverage.cells] += self._nu_surface[:, species].T @ events.surface
         return made
 

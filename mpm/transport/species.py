@@ -139,8 +139,8 @@ class Transport:
 
     def _products(self, matrices: list[StepMatrix], concentration: Floats) -> Floats:
         result = np.empty_like(concentration)
-        for i, (matrix, c) in enumerate(zip(matrices, concentration, strict=True)):
-            result[i] = matrix.multiply(c)
+        for matrix, c, made in zip(matrices, concentration, result, strict=True):
+            matrix.multiply(c, made)
         return result
 
     def diffusion(self, name: str, at_rest: bool = False) -> Floats:

@@ -27,7 +27,7 @@ class BoxFluxes:
 
     def __init__(self, strip: Strip):
         faces, own = strip.faces, strip.owned
-        across, alone = ~faces.vertical_flow, faces.behind == faces.ahead
+        across = ~faces.vertical_flow
         left, right = (AFTER, BEFORE) if strip.box.leftwards else (BEFORE, AFTER)
         numbers = np.arange(len(faces.behind))
         # of each coupling its place among what faces take from behind, then from ahead, then a zero
@@ -38,22 +38,13 @@ class BoxFluxes:
             (BELOW, faces.ahead, faces.vertical_flow),
             (ABOVE, faces.behind, faces.vertical_flow),
         ):
-            mine = numbers[between & ~alone & (cell < own)]
+            mine = numbers[between & (cell < own)]
             self._places[side, cell[mine]] = mine + (len(numbers) if cell is faces.behind else 0)
-        # of the one column of a strip that is closed: what leaves a cell to the right comes back from the left
-        self._alone, self._returned = numbers[alone], faces.behind[alone]
 
     def couplings(self, operator: FluxOperator) -> Floats:
         """Of a BoxMatrix, (4, own) [m2/s]."""
         taken = np.concatenate([operator.from_behind, operator.from_ahead, [0.0]])
         return np.asarray(-taken[self._places])
-
-    def outflow(self, operator: FluxOperator) -> Floats:
-        """What leaves each own cell per concentration, (own,) [m2/s]."""
-        if not len(self._alone):
-            return operator.outflow
-        returned = (operator.from_behind + operator.from_ahead)[self._alone]
-        return operator.outflow - np.bincount(self._returned, returned, len(operator.outflow))
 
 
 class StepMatrix:
@@ -97,14 +88,16 @@ class StepMatrix:
         if self.version != operator.version:
             self.matrix.couplings[0] = self._fluxes.couplings(operator)
         held = self.strip.gas_volume[: self.strip.owned] if storage is None else storage
-        self.diagonal[:] = self._fluxes.outflow(operator) + held / dt
+        self.diagonal[:] = operator.outflow + held / dt
         self.version, self._dt, self._operator = operator.version, dt, operator
         self._heaviest = float(largest(self.strip.comm, [self.diagonal.max(initial=0.0)])[0])
         self._factorised = False
 
-    def multiply(self, values: Floats) -> Floats:
-        """The product with own `values`, (own,); collective."""
-        return np.asarray(self.matrix.multiply(values[None])[0])
+    def multiply(self, values: Floats, result: Floats | None = None) -> Floats:
+        """The product with own `values`, (own,), in `result` where there is one; collective."""
+        made = np.empty_like(values) if result is None else result
+        self.matrix.multiply(values, made)
+        return made
 
     def solve(self, rhs: Floats, guess: Floats, recurs: bool = False) -> Floats:
         """From own values `guess` to the solution, (own,); collective. Raises ConvergenceError.
