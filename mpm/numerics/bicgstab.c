@@ -29,39 +29,31 @@ FAST double first_half(long n, double alpha, const double *restrict v, double *r
     return square;
 }
 
-/* sums[0], sums[1] = t r, t t */
-FAST void shares(long n, const double *restrict t, const double *restrict r, double *restrict sums)
+/* sums = t r, t t, shadow r, shadow t */
+FAST void shares(long n, const double *restrict t, const double *restrict r, const double *restrict shadow, double *restrict sums)
 {
-    double with = 0.0, square = 0.0;
-#pragma omp simd reduction(+ : with, square)
+    double with = 0.0, square = 0.0, along_r = 0.0, along_t = 0.0;
+#pragma omp simd reduction(+ : with, square, along_r, along_t)
     for (long k = 0; k < n; ++k) {
         with += t[k] * r[k];
         square += t[k] * t[k];
+        along_r += shadow[k] * r[k];
+        along_t += shadow[k] * t[k];
     }
     sums[0] = with;
     sums[1] = square;
+    sums[2] = along_r;
+    sums[3] = along_t;
 }
 
-/* x + alpha p + omega r in place of x, then r - omega t in place of r; sums[0], sums[1] = r r, shadow r */
-FAST void second_half(long n, double alpha, double omega, const double *restrict p, const double *restrict t,
-                      const double *restrict shadow, double *restrict x, double *restrict r, double *restrict sums)
+/* x + alpha p + omega r in place of x, r - omega t in place of r, and then r + beta (p - omega v) in place of p */
+FAST void second_half(long n, double alpha, double omega, double beta, const double *restrict v, const double *restrict t,
+                      double *restrict x, double *restrict r, double *restrict p)
 {
-    double square = 0.0, along = 0.0;
-#pragma omp simd reduction(+ : square, along)
     for (long k = 0; k < n; ++k) {
         x[k] += alpha * p[k] + omega * r[k];
         const double here = r[k] - omega * t[k];
         r[k] = here;
-        square += here * here;
-        along += shadow[k] * here;
+        p[k] = here + beta * (p[k] - omega * v[k]);
     }
-    sums[0] = square;
-    sums[1] = along;
-}
-
-/* r + beta (p - omega v) in place of p */
-FAST void turn(long n, double beta, double omega, const double *restrict r, const double *restrict v, double *restrict p)
-{
-    for (long k = 0; k < n; ++k)
-        p[k] = r[k] + beta * (p[k] - omega * v[k]);
 }

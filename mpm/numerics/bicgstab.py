@@ -22,14 +22,13 @@ SOURCE = Path(__file__).with_name("bicgstab.c")
 FUNCTIONS = """
 double dot(long n, const double *a, const double *b);
 double first_half(long n, double alpha, const double *v, double *r);
-void shares(long n, const double *t, const double *r, double *sums);
-void second_half(long n, double alpha, double omega, const double *p, const double *t, const double *shadow, double *x, double *r,
-                 double *sums);
-void turn(long n, double beta, double omega, const double *r, const double *v, double *p);
+void shares(long n, const double *t, const double *r, const double *shadow, double *sums);
+void second_half(long n, double alpha, double omega, double beta, const double *v, const double *t, double *x, double *r, double *p);
 """
 ITERATIONS = 400  # before it counts as failed
 # share of a residual along that of the start below which nothing is left of it but rounding, as when one inlet feeds a long column
 NOTHING_ALONG = 1e-14
+ROUNDING = 4.0 * np.finfo(float).eps  # of the difference of two squares
 
 
 class BiCGStab:
@@ -42,7 +41,7 @@ class BiCGStab:
         self.comm, self.name, self._apply, self._size = comm, name, apply, size
         self._c = compiled(comm, SOURCE, FUNCTIONS)
         self._p, self._v, self._t, self._shadow = (np.zeros(size) for _ in range(4))
-        self._sums = np.zeros(2)
+        self._sums = np.zeros(4)
 
     def solve(self, r: Floats, tolerance: float, least: float) -> tuple[Floats, int]:
         """The solution from a guess of nothing and the number of iterations, for the right-hand side `r`, which becomes the residual;
@@ -50,14 +49,12 @@ class BiCGStab:
 
         It stops where the 2-norm of the residual is not above `tolerance` times its first one, or `least`. Raises ConvergenceError.
         """
-        c, n, p, v, t, shadow, sums = (
-            self._c, self._size, self._p, self._v, self._t, self._shadow, self._sums
-        )  # fmt: skip
-        x = np.zeros(n)
-        at_r, at_p, at_v, at_t, at_x, at_shadow, at_sums = map(pointer, (r, p, v, t, x, shadow, sums))
+        c, n, x = self._c, self._size, np.zeros(self._size)
+        p, v, t, shadow, sums = self._p, self._v, self._t, self._shadow, self._sums
+        at_r, at_p, at_v, at_t, at_x, at_shadow = map(pointer, (r, p, v, t, x, shadow))
         square = self._total([c.dot(n, at_r, at_r)])[0]
         goal = max(tolerance**2 * square, least**2)
-        started = rho = 0.0
+        started = rho = 0.0  # squared residual and its part along the shadow, since the start
         for iteration in range(ITERATIONS):
             if square <= goal:
                 return x, iteration
@@ -69,20 +66,18 @@ class BiCGStab:
             if along == 0.0 or not np.isfinite(along):
                 break
             alpha = rho / along
-            left = c.first_half(n, alpha, at_v, at_r)
+            half = c.first_half(n, alpha, at_v, at_r)
             self._apply(r, t)
-            c.shares(n, at_t, at_r, at_sums)
-            left, with_t, of_t = self._total([left, *sums])
-            omega = with_t / of_t if of_t > 0.0 and left > goal else 0.0
-            c.second_half(n, alpha, omega, at_p, at_t, at_shadow, at_x, at_r, at_sums)
-            square, new = self._total(sums)
+            c.shares(n, at_t, at_r, at_shadow, pointer(sums))
+            half, with_t, of_t, along_r, along_t = self._total([half, *sums])
+            omega = with_t / of_t if of_t > 0.0 and half > goal else 0.0
+            new = along_r - omega * along_t
+            beta = new / rho * alpha / omega if omega != 0.0 else 0.0
+            c.second_half(n, alpha, omega, beta, at_v, at_t, at_x, at_r, at_p)
+            square = max(half - omega * with_t, ROUNDING * half)
             if not np.isfinite(square):
                 break
-            if omega == 0.0:
-                rho = 0.0  # starts again, if it was not the end
-                continue
-            c.turn(n, new / rho * alpha / omega, omega, at_r, at_v, at_p)
-            rho = new
+            rho = new if omega != 0.0 else 0.0  # else it starts again, unless that was the end
         raise ConvergenceError(
             f"{self.name}: the linear solver stopped after {iteration + 1} iterations at residual {np.sqrt(square):.3g}"
         )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,13 +29,23 @@ class Seam:
     earlier: bool
 
 
+class Piece(NamedTuple):
+    """Columns from `first` to before `end` that are done in one go, and the sides with a seam that they are at: where the neighbour is
+    `earlier`, and where it is later."""
+
+    first: int
+    end: int
+    earlier: tuple[int, ...]
+    later: tuple[int, ...]
+
+
 class Box:
     """This rank's box of a strip with `rows` and `all_columns`, `closed` where its last column is next to its first.
 
     `columns` (n,) are its columns of the strip in the order in which it goes through them, `leftwards` or to the right, its cells column
     after column from the bottom.
-    `seams` are those at its START and END, None where nobody is. `pieces` are its columns in order, (first, end, sides) of each: those at
-    seams by themselves, with the sides that they are at, the others between them in one. Ranks beyond the number of columns have none.
+    `seams` are those at its START and END, None where nobody is. `pieces` are its columns in order, those at seams by themselves, the
+    others between them in one. Ranks beyond the number of columns have none.
     """
 
     def __init__(self, comm: MPI.Comm, rows: int, all_columns: int, closed: bool):
@@ -88,18 +99,19 @@ class Box:
             raise ValueError("nobody is there")
         return seam
 
-    def _pieces(self) -> list[tuple[int, int, list[int]]]:
+    def _pieces(self) -> list[Piece]:
         count = len(self.columns)
         cuts = {0, count}
         if START in self.sides:
             cuts.add(min(1, count))
         if END in self.sides:
             cuts.add(max(count - 1, 0))
-        inside = sorted(cuts)
-        return [
-            (first, end, [side for side in self.sides if (first == 0, end == count)[side]])
-            for first, end in pairwise(inside)
-        ]
+        pieces = []
+        for first, end in pairwise(sorted(cuts)):
+            at = [side for side in self.sides if (first == 0, end == count)[side]]
+            earlier = tuple(side for side in at if self.seam(side).earlier)
+            pieces.append(Piece(first, end, earlier, tuple(side for side in at if side not in earlier)))
+        return pieces
 
     # --- messages, which do not wait for each other ---
 
@@ -118,14 +130,18 @@ class Box:
         if seam.rank == self.comm.rank:
             into[:] = self._kept.pop(side)
             return
+        if into.flags.c_contiguous:
+            self.comm.Recv(into, source=seam.rank, tag=side)
+            return
         message = np.empty(into.shape)
         self.comm.Recv(message, source=seam.rank, tag=side)
         into[:] = message
 
     def finish(self) -> None:
         """Wait until all that was given has gone."""
-        MPI.Request.Waitall(self._sent)
-        self._sent.clear()
+        if self._sent:
+            MPI.Request.Waitall(self._sent)
+            self._sent.clear()
 
 
 def column_owners(columns: int, ranks: int) -> Ints:

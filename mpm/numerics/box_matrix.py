@@ -85,28 +85,28 @@ class Factor:
         self.inverse = np.zeros((box.cells, unknowns, unknowns))  # of P
         self._excess = np.zeros_like(self.inverse)  # P^-1 D - 2
         self._swept = np.zeros((1, 4, box.cells if unknowns == 1 else 0))  # couplings times P^-1
-        self._couplings = self._swept  # that sweeps take
-        self.x, self._nothing = (BoxVector(box, unknowns) for _ in range(2))
+        self._x, self._nothing = (BoxVector(box, unknowns) for _ in range(2))
         self._column, self._beyond = (np.zeros((unknowns, box.rows)) for _ in range(2))
+        self._fixed = [pointer(a) for a in (self._swept, self.inverse, self._excess)]  # that sweeps take
+        self._at = [pointer(a) for a in (self._x.all, self._nothing.all, self._column, self._beyond)]
 
     def renew(self, couplings: Floats, blocks: Floats) -> None:
         """Find P for these, as in BoxMatrix; collective."""
         box, rows = self.box, self.box.rows
         edge = {START: slice(0, rows), END: slice(box.cells - rows, box.cells)}
         out = {START: couplings[:, BEFORE], END: couplings[:, AFTER]}
-        beyond = {side: np.zeros((rows, self.unknowns, self.unknowns)) for side in (START, END)}
-        self._couplings = self._swept if self.unknowns == 1 else couplings
+        beyond = [np.zeros((rows, self.unknowns, self.unknowns)) for _ in (START, END)]
         made = self.inverse, self._excess, self._swept
-        arrays = [pointer(a) for a in (couplings, blocks, beyond[START], beyond[END], *made)]
-        for first, end, sides in box.pieces:
-            for side in sides:
-                if box.seam(side).earlier:
-                    box.take(side, beyond[side])
+        arrays = [pointer(a) for a in (couplings, blocks, *beyond, *made)]
+        for first, end, earlier, later in box.pieces:
+            for side in earlier:
+                box.take(side, beyond[side])
             self._c.find_pivots(*box.shape, first, end, RELAXED, *arrays)
-            for side in sides:
-                if not box.seam(side).earlier:
-                    box.give(side, self.inverse[edge[side]] * out[side][:, edge[side]].T[:, None, :])
+            for side in later:
+                box.give(side, self.inverse[edge[side]] * out[side][:, edge[side]].T[:, None, :])
         box.finish()
+        if self.unknowns > 1:
+            self._fixed[0] = pointer(couplings)
 
     def weigh(self, rhs: Floats) -> Floats:
         """P^-1 times a vector."""
@@ -116,42 +116,41 @@ class Factor:
 
     def sweep_back(self, y: Floats) -> Floats:
         """x of (P + U) x = P y, a view that the next sweep changes; collective."""
-        box, x = self.box, self.x
-        arrays = [pointer(a) for a in (self._couplings, self.inverse, y, x.all)]
-        for first, end, sides in reversed(box.pieces):
-            for side in sides:
-                if not box.seam(side).earlier:
-                    box.take(side, x.beyond[side])
-            to_start = START in sides and not box.seam(START).earlier
-            self._c.sweep_back(*box.shape, first, end, to_start, *arrays)
-            for side in sides:
-                if box.seam(side).earlier:
-                    box.give(side, x.column[side])
+        box, x = self.box, self._x
+        swept, inverse, _ = self._fixed
+        given, made = pointer(y), self._at[0]
+        rows, columns = box.shape
+        for first, end, earlier, later in reversed(box.pieces):
+            for side in later:
+                box.take(side, x.beyond[side])
+            self._c.sweep_back(rows, columns, first, end, START in later, swept, inverse, given, made)
+            for side in earlier:
+                box.give(side, x.column[side])
         box.finish()
         return x.own
 
     def sweep_on(self, y: Floats, result: Floats) -> None:
         """x + f of (P + L) f = P y + (D - 2 P) x to `result`, x that of `sweep_back`; collective."""
-        self._on(y, self.x, result)
+        self._on(y, self._at[0], result)
 
     def sweep_on_alone(self, y: Floats, result: Floats) -> None:
         """f of (P + L) f = P y to `result`; collective."""
-        self._on(y, self._nothing, result)
+        self._on(y, self._at[1], result)
 
-    def _on(self, y: Floats, x: BoxVector, result: Floats) -> None:
-        box, column, beyond = self.box, self._column, self._beyond
-        fixed = [pointer(a) for a in (self._couplings, self.inverse, self._excess)]
-        arrays = [pointer(a) for a in (y, x.all, column, result)]
-        column[:] = 0.0
-        for first, end, sides in box.pieces:
-            for side in sides:
-                if box.seam(side).earlier:
-                    box.take(side, (column, beyond)[side])
-            to_end = END in sides and box.seam(END).earlier
-            self._c.sweep_on(*box.shape, first, end, *fixed, pointer(beyond) if to_end else NOTHING, *arrays)
-            for side in sides:
-                if not box.seam(side).earlier:
-                    box.give(side, column)
+    def _on(self, y: Floats, x: Any, result: Floats) -> None:
+        """With `x` where C finds it."""
+        box, there = self.box, (self._column, self._beyond)
+        _, _, column, beyond = self._at
+        given, made = pointer(y), pointer(result)
+        rows, columns = box.shape
+        self._column[:] = 0.0
+        for first, end, earlier, later in box.pieces:
+            for side in earlier:
+                box.take(side, there[side])
+            after = beyond if END in earlier else NOTHING
+            self._c.sweep_on(rows, columns, first, end, *self._fixed, after, given, x, column, made)
+            for side in later:
+                box.give(side, self._column)
         box.finish()
 
 

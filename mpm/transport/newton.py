@@ -79,7 +79,9 @@ class NewtonSystem:
     def solve(self, blocks: Floats, residual: Floats, tolerance: float) -> Floats:
         """The step (unknowns, own) with `blocks` (own, unknowns, unknowns) on the diagonal; collective."""
         self._matrix.blocks[:] = blocks
-        mutual = float(largest(self._comm, [mutual_coupling(blocks)])[0])
+        mutual = 0.0
+        if self._matrix.unknowns > 1:
+            mutual = float(largest(self._comm, [mutual_coupling(blocks)])[0])
         self._solver.factorise(mutual > MUTUAL, NEGLIGIBLE)
         return self._solver.solve(residual, tolerance)[0]
 
@@ -88,8 +90,6 @@ def mutual_coupling(blocks: Floats) -> float:
     """Largest share of a change of an unknown that comes back to it by way of others of its cell, in `blocks` (cells, unknowns, unknowns)
     of any cell."""
     unknowns = blocks.shape[1]
-    if unknowns == 1:
-        return 0.0
     if unknowns == 2:
         back = (blocks[:, 0, 1] * blocks[:, 1, 0]) / (blocks[:, 0, 0] * blocks[:, 1, 1])
         return float(np.abs(back).max(initial=0.0))
