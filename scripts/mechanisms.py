@@ -397,11 +397,10 @@ class Halvings:
             operators: Operators,
             t0: float,
             dt: float,
-            recurs: bool = False,
             halvings: int = 0,
         ) -> None:
             self.deepest = max(self.deepest, halvings)
-            whole(transport, operators, t0, dt, recurs, halvings)
+            whole(transport, operators, t0, dt, halvings)
 
         Transport.advance = advance  # type: ignore[method-assign, assignment]
         return self

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from mpm.motion.schedule import MANY, RESTING, Schedule, aligned_step
+from mpm.motion.schedule import RESTING, Schedule, aligned_step
 
 from .cases import SHORT, TINY, strip_case, zone
 
@@ -74,18 +74,3 @@ def test_a_strip_without_a_bed_does_not_align_its_steps() -> None:
         for speed in ("0 m/s", "1.3 cm/s")
     }
     assert steps["0 m/s"] == steps["1.3 cm/s"]
-
-
-def test_which_steps_recur() -> None:
-    """Fails when a step counts as one of many alike though it is cut, a phase of a cycle, or one of a few before the vibration."""
-    averaged = Schedule(dt=0.014, phases=1, start=0.05, end=1.0)
-    *few, last = averaged.from_step(0)
-    resting = averaged.resting_steps
-    assert resting < MANY and last.cut and not averaged.recurs(last)
-    assert [averaged.recurs(step) for step in few] == [False] * resting + [True] * (len(few) - resting)
-    phases = Schedule(dt=0.014, phases=32, start=0.5, end=1.0)
-    assert phases.resting_steps >= MANY
-    for step in phases.from_step(0):
-        assert phases.recurs(step) == (step.phase == RESTING)
-    longer = Schedule(dt=0.014, phases=1, start=0.05, end=2.0)
-    assert all(longer.recurs(longer.step(n)) == averaged.recurs(averaged.step(n)) for n in range(len(few)))

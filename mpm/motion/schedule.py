@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
 
 RESTING = -1
-MANY = 10  # steps: what a factor costs, in solutions without it (species, 49,731 cells)
 SLACK = 1e-9  # of a step or an output interval: times that agree to this are equal
 
 
@@ -107,15 +106,6 @@ class Schedule:
             k, dt = index - rest, self.dt
             t0, t1, phase, since = self.start + k * dt, self.start + (k + 1) * dt, k % self.phases, k * dt
         return Step(index=index, t0=t0, t1=t1, dt=dt, whole=dt, phase=phase, since=since)
-
-    def recurs(self, step: Step) -> bool:
-        """Whether so many steps are like this one, in length and velocity field, that a factor of their matrix is worth its making.
-
-        Said of a kind of step, not counted: a run that is resumed, or ends later, solves each step in the same way.
-        """
-        if step.cut:
-            return False
-        return self.resting_steps >= MANY if step.phase == RESTING else self.phases == 1
 
     def from_step(self, index: int) -> Iterator[Step]:
         """All steps from `index` on."""

@@ -91,55 +91,6 @@ class DirectSolver:
         self.matrix.destroy()
 
 
-class ServingSolver:
-    """A complete factor that serves hundreds of solves: PETSc's own, by nested dissection; made anew for a new version of the matrix.
-
-    Of one unknown per cell it is as fast to make as that of MUMPS and solves in a fifth of the time (49,731 cells: 0.16 s, then 2.5 ms
-    instead of 11 to 14). On several ranks each has a copy of the whole matrix and solves the whole system, which on a few is still quicker
-    than to iterate together.
-    """
-
-    def __init__(self, matrix: PETSc.Mat, name: str):
-        self.name, self.matrix = name, matrix
-        self._version: object = None  # of the matrix that the factor is of
-        self._shared = matrix.comm.size > 1
-        self._copy: PETSc.Mat | None = None
-        if self._shared:
-            self._gather, self._whole = PETSc.Scatter.toAll(matrix.createVecLeft())
-            self._found = self._whole.duplicate()
-        self.ksp = PETSc.KSP().create(self._whole.comm if self._shared else matrix.comm)
-        self.ksp.setType("preonly")
-        pc = self.ksp.getPC()
-        pc.setType("lu")
-        pc.setFactorSolverType("petsc")
-        pc.setFactorOrdering(PETSc.Mat.OrderingType.ND)
-
-    def solve(self, rhs: PETSc.Vec, solution: PETSc.Vec, version: object) -> None:
-        """Solve for one right-hand side with the `version` that the matrix now has; collective. Raises ConvergenceError."""
-        if self._version != version:
-            self._renew()
-            self._version = version
-        if self._shared:
-            self._gather.scatter(rhs, self._whole)
-            self.ksp.solve(self._whole, self._found)
-            first, end = solution.getOwnershipRange()
-            solution.array[:] = self._found.array[first:end]
-        else:
-            self.ksp.solve(rhs, solution)
-        check(self.ksp, self.name)
-
-    def _renew(self) -> None:
-        """Let the next solve make a factor of the matrix as it is now."""
-        matrix = self.matrix
-        if self._shared:
-            everything = PETSc.IS().createStride(matrix.size[0], comm=self._whole.comm)
-            (matrix,) = matrix.createSubMatrices([everything])
-            if self._copy is not None:
-                self._copy.destroy()
-            self._copy = matrix
-        self.ksp.setOperators(matrix)
-
-
 def check(ksp: PETSc.KSP, name: str) -> None:
     """Raise ConvergenceError unless `ksp` has converged."""
     reason = ksp.getConvergedReason()

@@ -137,10 +137,9 @@ class System:
             columns = self.coverage.slide(self._slide(step))
             velocity = self.flow.sequence.at(step) if warm is None else warm.begin(step, columns)
             operators = self.operators(velocity, step.phase == RESTING)
-            recurs = self.schedule.recurs(step) and self.recurring
-            self.transport.advance(operators, step.t0, step.dt, recurs)
+            self.transport.advance(operators, step.t0, step.dt)
             if warm is not None:
-                warm.finish(velocity, step.dt, recurs)
+                warm.finish(velocity, step.dt)
         except ConvergenceError as error:
             self._recall(before)
             raise ConvergenceError(f"step {step.index + 1}: {error}") from error

@@ -186,15 +186,15 @@ class Thermal:
         self._events = ledger.surface, ledger.gas
         return self.flow.at(step)
 
-    def finish(self, field: FlowField, dt: float, recurs: bool) -> None:
-        """Heat over `dt` [s] in the flow of the step, with what its reactions have given off; `recurs` as for species.
+    def finish(self, field: FlowField, dt: float) -> None:
+        """Heat over `dt` [s] in the flow of the step, with what its reactions have given off.
 
         Raises ConvergenceError.
         """
         if field not in self._operators:
             self._operators[field] = self.heat.fluxes.operator(field, self.gas)
         made, carried = self._given_off(), self._carried()
-        self.heat.advance(self._operators[field], self._before, self.gas, dt, made, recurs, carried)
+        self.heat.advance(self._operators[field], self._before, self.gas, dt, made, carried)
 
     def _fractions(self) -> Fractions:
         """Mole fractions of the species in own cells, at present."""

@@ -103,14 +103,12 @@ class Heat:
         after: GasState,
         dt: float,
         made: Floats,
-        recurs: bool = False,
         carried: Sequence[Diffusing] = (),
     ) -> None:
         """One step of `dt` [s] in which the density goes from `before` to `after` and reactions give off `made` (own,) [J/m]; collective.
 
         `carried` are the species that take heat along as they diffuse, at the temperatures before the step.
-
-        Steps that `recur` are many with the same operator, density and `dt`. Raises ConvergenceError, the temperatures kept.
+        Raises ConvergenceError, the temperatures kept.
         """
         own = slice(0, self.strip.owned)
         drawn = self.fluxes.outlet_means(operator, self.excess)
@@ -121,7 +119,7 @@ class Heat:
         rhs = (held - lost) * self.excess / dt + self.fluxes.supply(operator, drawn) + given / self.unit
         # for the change: errors are relative to that, not to all that hot solids hold
         imbalance = rhs - self._matrix.multiply(self.excess)
-        change = self._matrix.solve(imbalance, np.zeros_like(self.excess), recurs)
+        change = self._matrix.solve(imbalance, np.zeros_like(self.excess))
         require_plausible(self.fluxes.case, self.strip, self.temperature + change)
         self.excess = self.excess + change
         self.book(operator, drawn, dt, total_of(self.strip.comm, made))

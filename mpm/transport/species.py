@@ -169,17 +169,15 @@ class Transport:
 
     # --- one step ---
 
-    def advance(
-        self, operators: Operators, t0: float, dt: float, recurs: bool = False, halvings: int = 0
-    ) -> None:
+    def advance(self, operators: Operators, t0: float, dt: float, halvings: int = 0) -> None:
         """Advance concentrations, coverage and ledger from `t0` by `dt` [s] in the velocity field of `operators`; collective.
 
-        Steps that `recurs` are many with the same operators and the same `dt`. A step whose Newton iteration fails is halved, up to
+        A step whose Newton iteration fails is halved, up to
         HALVINGS times. Raises ConvergenceError after that.
         """
         before, covered = self.memento(), self.coverage.memento()
         try:
-            self._advance(operators, t0, dt, recurs)
+            self._advance(operators, t0, dt)
         except ConvergenceError as error:
             self.recall(before)
             self.coverage.recall(covered)
@@ -202,7 +200,7 @@ class Transport:
         self.concentration, self.past = memento.concentration, memento.past
         self.ledger.recall(memento.ledger)
 
-    def _advance(self, operators: Operators, t0: float, dt: float, recurs: bool) -> None:
+    def _advance(self, operators: Operators, t0: float, dt: float) -> None:
         old, coupled = self.concentration, self.coupled
         drawn = self.ports.outlet_means(operators, old)
         shares = self.ports.shares(t0, dt)
@@ -226,7 +224,7 @@ class Transport:
             matrix.update(operators[i], dt)
             rhs = storage * old[i] + supply[i] + made[i - coupled]
             guess = foreseen[i] + missed[i - coupled]
-            new[i] = matrix.solve(rhs, possible(guess, old[i]), recurs)
+            new[i] = matrix.solve(rhs, possible(guess, old[i]))
         self.concentration, self.past = new, self.past.followed_by(old, dt)
         self.ledger.book(self.ports, operators, new, dt, shares, drawn, events)
 

@@ -1,4 +1,4 @@
-"""The matrix of one time step of what spreads alike, storage/dt + fluxes, and its solvers."""
+"""The matrix of one time step of what spreads alike, storage/dt + fluxes, and its solver."""
 
 from __future__ import annotations
 
@@ -9,13 +9,9 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.mesh.strip import Strip
 from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver
-from mpm.numerics.linear import ServingSolver
 from mpm.parallel import largest, total
-from mpm.transport.cell_matrix import CellMatrix
 from mpm.transport.fluxes import FluxOperator
 
-# ranks on which solving the whole system on each with a complete factor takes no longer than iterating together
-FEW = 2
 FALL = 1e-13  # of a right-hand side, where that is not below what a step may leave before
 FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
 NEVER = -1  # version of no operator
@@ -48,7 +44,7 @@ class BoxFluxes:
 
 
 class StepMatrix:
-    """storage/dt + fluxes for what spreads alike, with the solvers that go with it.
+    """storage/dt + fluxes for what spreads alike, with the solver that goes with it.
 
     Stored are species, in the volume of the gas, unless `update` says otherwise. A solution leaves a sum of |residual| over all cells below
     `residual` [mol/m/s], or `fall` of that of the right-hand side.
@@ -62,7 +58,6 @@ class StepMatrix:
         self._residual, self._fall = residual / np.sqrt(max(strip.grid.cells, 1)), fall
         self._heaviest = 0.0  # entry of the diagonal
         self._factorised = False
-        self._serving: Serving | None = None  # once the matrix recurs
 
     @cached_property
     def _krylov(self) -> BoxSolver:
@@ -89,7 +84,7 @@ class StepMatrix:
             self.matrix.couplings[0] = self._fluxes.couplings(operator)
         held = self.strip.gas_volume[: self.strip.owned] if storage is None else storage
         self.diagonal[:] = operator.outflow + held / dt
-        self.version, self._dt, self._operator = operator.version, dt, operator
+        self.version, self._dt = operator.version, dt
         self._heaviest = float(largest(self.strip.comm, [self.diagonal.max(initial=0.0)])[0])
         self._factorised = False
 
@@ -99,14 +94,8 @@ class StepMatrix:
         self.matrix.multiply(values, made)
         return made
 
-    def solve(self, rhs: Floats, guess: Floats, recurs: bool = False) -> Floats:
-        """From own values `guess` to the solution, (own,); collective. Raises ConvergenceError.
-
-        Where the matrix `recurs`, step after step, with a complete factor of it that is kept, on a FEW ranks.
-        """
-        if recurs and self.strip.comm.size <= FEW:
-            self._serving = self._serving or Serving(self.strip, self.name)
-            return self._serving.solve(self._operator, self.diagonal, rhs, (self.version, self._dt))
+    def solve(self, rhs: Floats, guess: Floats) -> Floats:
+        """From own values `guess` to the solution, (own,); collective. Raises ConvergenceError."""
         size = float(np.sqrt(total(self.strip.comm, [((rhs / self.diagonal) ** 2).sum()])[0]))
         if size == 0.0:
             return np.zeros_like(rhs)
@@ -118,23 +107,3 @@ class StepMatrix:
             least = min(least, TRACE * size)
         missing = rhs - self.multiply(guess)
         return np.asarray(guess + self._krylov.solve(missing[None], 0.0, least)[0][0])
-
-
-class Serving:
-    """A complete factor of a matrix that recurs, step after step."""
-
-    def __init__(self, strip: Strip, name: str):
-        self._cells = CellMatrix(strip, 1)
-        self._solver = ServingSolver(self._cells.matrix, name)
-        self._right, self._found = self._cells.matrix.createVecs()
-        self._holds: object = None
-
-    def solve(self, operator: FluxOperator, diagonal: Floats, rhs: Floats, version: object) -> Floats:
-        """With the matrix of `operator` and this `diagonal`, whose `version` tells when it is another one; collective."""
-        if self._holds != version:
-            self._cells.set_fluxes([operator])
-            self._cells.assemble(diagonal)
-            self._holds = version
-        self._right.array[:] = rhs
-        self._solver.solve(self._right, self._found, version)
-        return np.array(self._found.array)

@@ -51,7 +51,7 @@ def _marched(
         for number in range(SHARES * steps):
             if number % SHARES == 0:
                 coverage.slide(column)
-            transport.advance(operators, LATE + number * dt, dt, recurs=True)
+            transport.advance(operators, LATE + number * dt, dt)
         return transport.concentration, coverage.theta
     finally:
         transport.recall(gas)
