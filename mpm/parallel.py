@@ -1,4 +1,4 @@
-"""Reductions and gathers over the ranks: the only module that talks to other ranks by hand."""
+"""Reductions and gathers over the ranks: whatever all of them take part in. What neighbours tell each other is in `mpm.numerics.box`."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@
 #define COUPLING(which, i, k) couplings[(4L * (i) + which) * cells + (k)]
 enum { BEFORE, AFTER, BELOW, ABOVE };
 
-#if defined(__x86_64__) && defined(__linux__) && defined(__GNUC__)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
 #define FAST __attribute__((target_clones("arch=x86-64-v3", "default"))) /* multiplies and adds at once where the processor can */
 #else
 #define FAST

@@ -138,7 +138,7 @@ class Transport:
         return matrices
 
     def _products(self, matrices: list[StepMatrix], concentration: Floats) -> Floats:
-        result = np.empty_like(concentration)
+        result = np.empty(concentration.shape)
         for matrix, c, made in zip(matrices, concentration, result, strict=True):
             matrix.multiply(c, made)
         return result

@@ -15,7 +15,7 @@ from mpm.transport.fluxes import FluxOperator
 FALL = 1e-13  # of a right-hand side, where that is not below what a step may leave before
 FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
 NEVER = -1  # version of no operator
-TRACE = 1e-10  # of what there is: what a step may leave of a species that is there in traces, which balance to 1e-9, too
+TRACE = 1e-11  # of a right-hand side: what a step may leave of a species that is there in traces, which balance to 1e-9, too
 
 
 class BoxFluxes:
@@ -90,7 +90,7 @@ class StepMatrix:
 
     def multiply(self, values: Floats, result: Floats | None = None) -> Floats:
         """The product with own `values`, (own,), in `result` where there is one; collective."""
-        made = np.empty_like(values) if result is None else result
+        made = np.empty(len(values)) if result is None else result
         self.matrix.multiply(values, made)
         return made
 
@@ -102,8 +102,6 @@ class StepMatrix:
         if not self._factorised:
             self._krylov.factorise()
             self._factorised = True
-        least = max(self._residual / self._heaviest, self._fall * size)
-        if self._fall == FALL_HEATED:
-            least = min(least, TRACE * size)
+        least = min(max(self._residual / self._heaviest, self._fall * size), TRACE * size)
         missing = rhs - self.multiply(guess)
         return np.asarray(guess + self._krylov.solve(missing[None], 0.0, least)[0][0])
