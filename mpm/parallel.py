@@ -31,8 +31,9 @@ def total(comm: MPI.Comm, values: ArrayLike) -> Floats:
 
 
 def largest(comm: MPI.Comm, values: ArrayLike) -> Floats:
-    """Maximum over ranks, elementwise; every rank gets the result."""
-    local = np.ascontiguousarray(values, dtype=np.float64)
+    """Maximum over ranks, elementwise; every rank gets the result, the same one: what is no number counts as infinite."""
+    local = np.asarray(values, dtype=np.float64)
+    local = np.where(np.isnan(local), np.inf, local)
     result = np.empty_like(local)
     comm.Allreduce(local, result, op=MPI.MAX)
     return result

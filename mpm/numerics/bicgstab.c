@@ -1,6 +1,6 @@
 /* Passes over vectors of n numbers in an iteration of BiCGStab (mpm/numerics/bicgstab.py), each once through memory. */
 
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12
 #define FAST __attribute__((target_clones("arch=x86-64-v3", "default")))
 #else
 #define FAST

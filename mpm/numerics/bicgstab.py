@@ -25,7 +25,7 @@ double first_half(long n, double alpha, const double *v, double *r);
 void shares(long n, const double *t, const double *r, const double *shadow, double *sums);
 void second_half(long n, double alpha, double omega, double beta, const double *v, const double *t, double *x, double *r, double *p);
 """
-ITERATIONS = 400  # before it counts as failed
+ITERATIONS = 1000  # before it counts as failed
 # share of a residual along that of the start below which nothing is left of it but rounding, as when one inlet feeds a long column
 NOTHING_ALONG = 1e-14
 ROUNDING = 4.0 * np.finfo(float).eps  # of the difference of two squares
@@ -55,14 +55,18 @@ class BiCGStab:
         square = self._total([c.dot(n, at_r, at_r)])[0]
         goal = max(tolerance**2 * square, least**2)
         started = rho = 0.0  # squared residual and its part along the shadow, since the start
-        for iteration in range(ITERATIONS):
-            if square <= goal:
+        for iteration in range(ITERATIONS + 1):
+            if square <= goal < np.inf:
                 return x, iteration
-            if rho * rho <= NOTHING_ALONG**2 * square * started:
+            fresh = rho * rho <= NOTHING_ALONG**2 * square * started
+            if fresh:
                 shadow[:] = p[:] = r
                 started = rho = square
             self._apply(p, v)
             along = self._total([c.dot(n, at_shadow, at_v)])[0]
+            if along == 0.0 and not fresh:
+                rho = 0.0  # starts again
+                continue
             if along == 0.0 or not np.isfinite(along):
                 break
             alpha = rho / along
@@ -79,7 +83,7 @@ class BiCGStab:
                 break
             rho = new if omega != 0.0 else 0.0  # else it starts again, unless that was the end
         raise ConvergenceError(
-            f"{self.name}: the linear solver stopped after {iteration + 1} iterations at residual {np.sqrt(square):.3g}"
+            f"{self.name}: the linear solver stopped after {iteration} iterations at residual {np.sqrt(square):.3g}"
         )
 
     def _total(self, values: list[float] | Floats) -> list[float]:

@@ -10,10 +10,11 @@
 #define EACH(i) for (int i = 0; i < UNKNOWNS; ++i)
 #define BLOCK (UNKNOWNS * UNKNOWNS)
 #define IN(values, k, i, j) (values)[(k) * BLOCK + (i) * UNKNOWNS + (j)]
+#define WEAKER(a, b) ((a) > (b) ? (a) : (b)) /* of two couplings, neither above zero */
 #define COUPLING(which, i, k) couplings[(4L * (i) + which) * cells + (k)]
 enum { BEFORE, AFTER, BELOW, ABOVE };
 
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12
 #define FAST __attribute__((target_clones("arch=x86-64-v3", "default"))) /* multiplies and adds at once where the processor can */
 #else
 #define FAST
@@ -53,7 +54,7 @@ static inline __attribute__((always_inline)) void cell_pivot(const Pivots *s, in
     double pivot[BLOCK], into[UNKNOWNS];
     EACH(i) EACH(j) IN(pivot, 0, i, j) = IN(blocks, k, i, j);
     if (column > 0) {
-        EACH(i) into[i] = COUPLING(BEFORE, i, k) + (row < rows - 1 ? s->relaxed * COUPLING(BELOW, i, k - rows + 1) : 0.0);
+        EACH(i) into[i] = COUPLING(BEFORE, i, k) + (row < rows - 1 ? s->relaxed * WEAKER(COUPLING(BELOW, i, k - rows + 1), COUPLING(ABOVE, i, k - rows)) : 0.0);
         EACH(i) EACH(j) IN(pivot, 0, i, j) -= into[i] * COUPLING(AFTER, j, k - rows) * IN(inverse, k - rows, i, j);
     } else {
         EACH(i) EACH(j) IN(pivot, 0, i, j) -= COUPLING(BEFORE, i, k) * IN(s->from_start, row, i, j);
@@ -61,7 +62,7 @@ static inline __attribute__((always_inline)) void cell_pivot(const Pivots *s, in
     if (column == s->columns - 1)
         EACH(i) EACH(j) IN(pivot, 0, i, j) -= COUPLING(AFTER, i, k) * IN(s->from_end, row, i, j);
     if (row > 0) {
-        EACH(i) into[i] = COUPLING(BELOW, i, k) + (column < s->columns - 1 ? s->relaxed * COUPLING(BEFORE, i, k - 1 + rows) : 0.0);
+        EACH(i) into[i] = COUPLING(BELOW, i, k) + (column < s->columns - 1 ? s->relaxed * WEAKER(COUPLING(BEFORE, i, k - 1 + rows), COUPLING(AFTER, i, k - 1)) : 0.0);
         EACH(i) EACH(j) IN(pivot, 0, i, j) -= into[i] * COUPLING(ABOVE, j, k - 1) * IN(inverse, k - 1, i, j);
     }
     invert(pivot);

@@ -6,6 +6,7 @@ import hashlib
 import os
 import sysconfig
 import tempfile
+from contextlib import suppress
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from mpm.arrays import Floats
 from mpm.numerics.fem import cache_directory, cannot_compile
-from mpm.parallel import on_root
+from mpm.parallel import any_rank, on_root
 
 from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
@@ -45,19 +46,36 @@ def _load(comm: MPI.Comm, source: Path, declarations: str, constants: dict[str, 
     library = cache_directory() / "compiled" / f"{name}{suffix}"
 
     def build() -> None:
-        if library.exists():
-            return
+        with suppress(ImportError):  # one that is broken is made again
+            if library.exists():
+                _functions(name, library)
+                return
         builder = cffi.FFI()
         builder.cdef(declarations)
         builder.set_source(name, text, extra_compile_args=FLAGS)
+        library.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=library.parent) as beside:
+            os.replace(builder.compile(tmpdir=beside), library)
+
+    def build_or_say() -> None:
         try:
-            library.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(dir=library.parent) as beside:
-                os.replace(builder.compile(tmpdir=beside), library)
-        except (OSError, cffi.VerificationError) as error:
+            build()
+        except (OSError, ImportError, cffi.VerificationError) as error:
             raise cannot_compile(error) from error
 
-    on_root(comm, build)
+    on_root(comm, build_or_say)
+    functions, error = None, ImportError("another process cannot load it")
+    try:
+        functions = _functions(name, library)
+    except ImportError as failed:
+        error = failed
+    if any_rank(comm, functions is None):
+        raise cannot_compile(error) from error
+    return functions
+
+
+def _functions(name: str, library: Path) -> Any:
+    """Those of a compiled library. Raises ImportError where it is none."""
     spec = spec_from_file_location(name, library)
     if spec is None or spec.loader is None:
         raise ImportError(f"{library} is no library")

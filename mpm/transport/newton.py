@@ -18,7 +18,7 @@ RESIDUAL = (
     1e-12  # sum of |residual| over all cells that Newton's method ends with, relative to the largest feed
 )
 FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
-QUADRATIC = 0.3
+QUADRATIC = 0.3  # inner tolerance over the residual, whose next value is about its square in any case
 # what the inner tolerance aims at, and no further: traces far from their inlet are reported too
 LAST = 1e-5 * RESIDUAL
 # share of a change that comes back to the same unknown by way of others in its cell, above which a factor takes up all of them together

@@ -172,8 +172,7 @@ class Transport:
     def advance(self, operators: Operators, t0: float, dt: float, halvings: int = 0) -> None:
         """Advance concentrations, coverage and ledger from `t0` by `dt` [s] in the velocity field of `operators`; collective.
 
-        A step whose Newton iteration fails is halved, up to
-        HALVINGS times. Raises ConvergenceError after that.
+        A step whose Newton iteration fails is halved, up to HALVINGS times. Raises ConvergenceError after that.
         """
         before, covered = self.memento(), self.coverage.memento()
         try:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from mpm.arrays import Floats
+from mpm.errors import ConvergenceError
 from mpm.mesh.strip import Strip
 from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver
 from mpm.parallel import largest, total
@@ -14,6 +15,9 @@ from mpm.transport.fluxes import FluxOperator
 
 FALL = 1e-13  # of a right-hand side, where that is not below what a step may leave before
 FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
+LOOSE = 10.0  # times what is wanted: a residual over the diagonal, which is near that over the pivots, with which a solution is taken
+CORRECTIONS = 4  # looks at the residual
+ROUNDING = 16.0 * np.finfo(float).eps  # of what a residual is the difference of
 NEVER = -1  # version of no operator
 TRACE = 1e-11  # of a right-hand side: what a step may leave of a species that is there in traces, which balance to 1e-9, too
 
@@ -47,7 +51,7 @@ class StepMatrix:
     """storage/dt + fluxes for what spreads alike, with the solver that goes with it.
 
     Stored are species, in the volume of the gas, unless `update` says otherwise. A solution leaves a sum of |residual| over all cells below
-    `residual` [mol/m/s], or `fall` of that of the right-hand side.
+    `residual` [mol/m/s], or a residual over the diagonal below `fall` of that of the right-hand side, in the 2-norm; about.
     """
 
     def __init__(self, strip: Strip, name: str, residual: float, fall: float = FALL):
@@ -74,7 +78,7 @@ class StepMatrix:
         return self.matrix.blocks[:, 0, 0]
 
     def update(self, operator: FluxOperator, dt: float, storage: Floats | None = None) -> None:
-        """Make it the matrix of `operator` over a step of `dt` [s], infinite for the steady one.
+        """Make it the matrix of `operator` over a step of `dt` [s], infinite for the steady one; collective.
 
         `storage` (own,) [m2] goes with the version of the operator; left out: the volume of the gas.
         """
@@ -95,13 +99,29 @@ class StepMatrix:
         return made
 
     def solve(self, rhs: Floats, guess: Floats) -> Floats:
-        """From own values `guess` to the solution, (own,); collective. Raises ConvergenceError."""
-        size = float(np.sqrt(total(self.strip.comm, [((rhs / self.diagonal) ** 2).sum()])[0]))
+        """From own values `guess` to the solution, (own,); collective. Raises ConvergenceError.
+
+        The residual is looked at again in the end: what BiCGStab goes on from may have drifted away from it.
+        """
+        size = self._norm(rhs)
         if size == 0.0:
             return np.zeros_like(rhs)
         if not self._factorised:
             self._krylov.factorise()
             self._factorised = True
         least = min(max(self._residual / self._heaviest, self._fall * size), TRACE * size)
-        missing = rhs - self.multiply(guess)
-        return np.asarray(guess + self._krylov.solve(missing[None], 0.0, least)[0][0])
+        found, enough = guess, least
+        for _ in range(CORRECTIONS):
+            missing = rhs - self.multiply(found)
+            left = self._norm(missing)
+            if left <= enough:
+                return found
+            found = found + self._krylov.solve(missing[None], 0.0, least)[0][0]
+            enough = max(LOOSE * least, ROUNDING * max(size, self._norm(self.diagonal * found)))
+        raise ConvergenceError(
+            f"{self.name}: a residual of {left:.3g} stays, over the diagonal, of {size:.3g}"
+        )
+
+    def _norm(self, values: Floats) -> float:
+        """2-norm over the diagonal; collective."""
+        return float(np.sqrt(total(self.strip.comm, [((values / self.diagonal) ** 2).sum()])[0]))
