@@ -233,3 +233,10 @@ FAST void multiply(int rows, int columns, const double *restrict couplings, cons
         }
     }
 }
+
+/* y + entries x in place of y in `count` cells. */
+FAST void act(long count, const long *restrict cells, const double *restrict entries, const double *restrict x, double *restrict y)
+{
+    for (long k = 0; k < count; ++k)
+        y[cells[k]] += entries[k] * x[cells[k]];
+}

@@ -35,6 +35,7 @@ void sweep_back(int rows, int columns, int first, int end, int to_start, const d
                 const double *y, double *x);
 void sweep_on(int rows, int columns, int first, int end, const double *couplings, const double *inverse, const double *excess,
               const double *beyond, const double *y, double *x, double *f, double *result);
+void act(long count, const long *cells, const double *entries, const double *x, double *y);
 void multiply(int rows, int columns, const double *couplings, const double *blocks, const double *x, double *result);
 """
 BEFORE, AFTER, BELOW, ABOVE = range(4)
@@ -165,6 +166,7 @@ class BoxSolver:
 
     def __init__(self, matrix: BoxMatrix, name: str):
         self.matrix, self.name = matrix, name
+        self._c = kernels(matrix.box, 1)
         self._factors: dict[int, list[Factor]] = {}  # by the number of unknowns of each
         self._together = 1
         self._across: list[tuple[int, int, Ints, Floats]] = []
@@ -210,7 +212,9 @@ class BoxSolver:
         if self._across:
             given = given.copy()
         for i, j, cells, entries in self._across:
-            given[i, cells] += entries * found[j][cells]
+            self._c.act(
+                len(cells), pointer(cells, "long"), pointer(entries), pointer(found[j]), pointer(given[i])
+            )
         for part, factor in self._parts():
             factor.sweep_on(given[part], made[part])
 

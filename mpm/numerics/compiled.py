@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import cffi
-from numpy.typing import NDArray
 
-from mpm.arrays import Floats
+from mpm.arrays import Floats, Ints
 from mpm.numerics.fem import cache_directory, cannot_compile
 from mpm.parallel import any_rank, on_root
 
@@ -84,6 +83,6 @@ def _functions(name: str, library: Path) -> Any:
     return module.lib
 
 
-def pointer(values: Floats | NDArray[Any]) -> Any:
-    """What C takes for a contiguous array of float64."""
-    return _BUILDER.from_buffer("double[]", values)
+def pointer(values: Floats | Ints, kind: str = "double") -> Any:
+    """What C takes for a contiguous array, of float64 or of another `kind`: `long` are int64. It keeps the array alive."""
+    return _BUILDER.from_buffer(f"{kind}[]", values)
