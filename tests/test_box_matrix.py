@@ -5,8 +5,10 @@ import pytest
 from numpy.typing import NDArray
 
 from mpm.errors import ConvergenceError
+from mpm.numerics import box_matrix
 from mpm.numerics.box import Box, column_owners
-from mpm.numerics.box_matrix import AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver, Factor
+from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver, Factor
+from mpm.transport.schemes import two_point_flux
 
 from mpi4py import MPI  # isort: skip  (after fem)
 
@@ -141,3 +143,46 @@ def test_what_does_not_converge() -> None:
     solver.factorise()
     with pytest.raises(ConvergenceError, match="a test: the linear solver stopped"):
         solver.solve(np.ones((1, 12)), 1e-9)
+
+
+def strip_matrix(velocity: float, storage: float) -> BoxMatrix:
+    """Fluxes of a closed strip, conductance 1, with random eddies of this `velocity`, and `storage` over the largest outflow of a cell."""
+    rows, columns = 24, 40
+    psi = np.random.default_rng(8).standard_normal((columns, rows + 1))  # at the lower left corners
+    psi[:, [0, -1]] = 0.0
+    psi *= velocity
+    right = np.roll(psi[:, 1:] - psi[:, :-1], -1, axis=0)  # through the right-hand face of (column, row)
+    up = psi - np.roll(psi, -1, axis=0)  # through the lower face
+    matrix = BoxMatrix(Box(MPI.COMM_SELF, rows, columns, True), 1)
+    couplings, outflow = matrix.couplings.reshape(4, columns, rows), np.zeros((columns, rows))
+    a, b = two_point_flux(right, 1.0)
+    couplings[BEFORE], couplings[AFTER] = -np.roll(a, 1, axis=0), -b
+    outflow += a + np.roll(b, 1, axis=0)
+    a, b = two_point_flux(up[:, 1:-1], 1.0)
+    couplings[BELOW, :, 1:], couplings[ABOVE, :, :-1] = -a, -b
+    outflow[:, :-1] += a
+    outflow[:, 1:] += b
+    matrix.blocks[:, 0, 0] = (outflow + storage * outflow.max()).ravel()
+    return matrix
+
+
+def iterations_of(matrix: BoxMatrix) -> int:
+    solver = BoxSolver(matrix, "a test")
+    solver.factorise()
+    rhs = np.random.default_rng(9).random((1, matrix.box.cells))
+    found, iterations = solver.solve(rhs, 1e-12)
+    product = np.empty_like(rhs)
+    matrix.multiply(found, product)
+    np.testing.assert_allclose(product, rhs, atol=1e-8)
+    return iterations
+
+
+def test_what_the_factor_makes_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails when the factor makes up for what is carried one way, which takes many times the iterations where gas goes round in circles, or
+    no longer for diffusion, which takes many more in long steps."""
+    diffusion, eddies = strip_matrix(0.0, 1e-3), strip_matrix(20.0, 1e-3)
+    now = iterations_of(diffusion), iterations_of(eddies)
+    monkeypatch.setattr(box_matrix, "RELAXED", 0.0)
+    without = iterations_of(diffusion), iterations_of(eddies)
+    assert now[0] < 0.75 * without[0]
+    assert now[1] < 1.25 * without[1]
