@@ -131,7 +131,7 @@ def test_the_factor_is_one_of_the_whole_matrix(closed: bool) -> None:
 def test_pivots_are_positive() -> None:
     """Fails when the relaxed factor of fluxes with next to no storage has a pivot that is not above zero."""
     matrix, _, _ = random_matrix(7, 9, 1, True, 0.0, storage=1e-9)
-    factor = Factor(matrix.box, 1)
+    factor = Factor(matrix.box, 1, 1)
     factor.renew(matrix.couplings, matrix.blocks)
     assert np.all(factor.inverse > 0.0)
 

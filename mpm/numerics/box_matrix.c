@@ -1,4 +1,4 @@
-/* Work of a BoxMatrix, cell after cell (mpm/numerics/box_matrix.py has the equations).
+/* Work on a BoxMatrix, cell after cell (mpm/numerics/box_matrix.py has the equations).
 
    A box has `columns` of `rows` cells, column after column, and UNKNOWNS per cell. Shapes, all contiguous:
    vectors (UNKNOWNS, cells); vectors with a column of a neighbour on either side (UNKNOWNS, rows + cells + rows);
@@ -219,7 +219,7 @@ FAST void sweep_on(int rows, int columns, int first, int end, const double *coup
 }
 
 /* The product with x, which has the neighbours' columns. */
-FAST void multiply(int rows, int columns, const double *restrict couplings, const double *restrict blocks, const double *restrict x,
+FAST void product(int rows, int columns, const double *restrict couplings, const double *restrict blocks, const double *restrict x,
                    double *restrict result)
 {
     const long cells = (long)rows * columns, width = cells + 2 * rows;
@@ -239,4 +239,14 @@ FAST void act(long count, const long *restrict cells, const double *restrict ent
 {
     for (long k = 0; k < count; ++k)
         y[cells[k]] += entries[k] * x[cells[k]];
+}
+
+/* P^-1 times a vector. */
+FAST void weigh(long cells, const double *restrict inverse, const double *restrict x, double *restrict y)
+{
+    EACH(i) for (long k = 0; k < cells; ++k) {
+        double sum = 0.0;
+        EACH(j) sum += IN(inverse, k, i, j) * x[j * cells + k];
+        y[i * cells + k] = sum;
+    }
 }

@@ -15,29 +15,21 @@ Cells are eliminated in the order of `mpm.numerics.box`, so that on any number o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mpm.arrays import Floats, Ints
-from mpm.numerics.bicgstab import BiCGStab
-from mpm.numerics.box import END, START, Box
-from mpm.numerics.compiled import NOTHING, compiled, pointer
+from mpm.arrays import Floats
+from mpm.errors import ConvergenceError
+from mpm.numerics.box import Box
+from mpm.numerics.compiled import compiled, pointer
+from mpm.numerics.messages import HANDLE, Neighbourhood
 
 RELAXED = 0.9  # from 0.8 to 1 the number of iterations hardly changes; 0 takes up to half as many again
-SOURCE = Path(__file__).with_name("box_matrix.c")
-FUNCTIONS = """
-void find_pivots(int rows, int columns, int first, int end, double relaxed, const double *couplings, const double *blocks,
-                 const double *from_start, const double *from_end, double *inverse, double *excess, double *swept);
-void sweep_back(int rows, int columns, int first, int end, int to_start, const double *couplings, const double *inverse,
-                const double *y, double *x);
-void sweep_on(int rows, int columns, int first, int end, const double *couplings, const double *inverse, const double *excess,
-              const double *beyond, const double *y, double *x, double *f, double *result);
-void act(long count, const long *cells, const double *entries, const double *x, double *y);
-void multiply(int rows, int columns, const double *couplings, const double *blocks, const double *x, double *result);
-"""
+ITERATIONS = 1000  # of BiCGStab before it counts as failed
+HEADER = Path(__file__).with_name("box.h")
+SOURCES = [HEADER.with_name(name) for name in ("box.c", "box_matrix.c", "box_solver.c")]
 BEFORE, AFTER, BELOW, ABOVE = range(4)
 
 
@@ -52,109 +44,86 @@ class BoxMatrix:
         self.box, self.unknowns = box, unknowns
         self.couplings = np.zeros((unknowns, 4, box.cells))
         self.blocks = np.zeros((box.cells, unknowns, unknowns))
-        self._c = kernels(box, unknowns)
-        self._x = BoxVector(box, unknowns)
+        module = kernels(box, unknowns)
+        self._c, self._neighbours = module.lib, Neighbourhood(module, box, unknowns * box.rows)
+        self._x = np.zeros((unknowns, box.cells + 2 * box.rows))  # with the columns of neighbours
+        self._own = self._x[:, box.rows : box.rows + box.cells]
+        self._arrays = [pointer(a) for a in (self.couplings, self.blocks, self._x)]
 
     def multiply(self, x: Floats, result: Floats) -> None:
         """A x to `result`; collective."""
-        box = self.box
-        self._x.own[:] = x
-        for side in box.sides:
-            box.give(side, self._x.column[side])
-        for side in box.sides:
-            box.take(side, self._x.beyond[side])
-        box.finish()
-        self._c.multiply(*box.shape, *map(pointer, (self.couplings, self.blocks, self._x.all, result)))
-
-
-class BoxVector:
-    """A vector with the columns of neighbours: `all` (unknowns, rows + cells + rows), views of its `own` cells, of the own `column` at each
-    side and of that `beyond` it."""
-
-    def __init__(self, box: Box, unknowns: int):
-        rows, cells = box.rows, box.cells
-        self.all = np.zeros((unknowns, cells + 2 * rows))
-        self.own = self.all[:, rows : rows + cells]
-        self.column = {START: self.all[:, rows : 2 * rows], END: self.all[:, cells : cells + rows]}
-        self.beyond = {START: self.all[:, :rows], END: self.all[:, cells + rows :]}
+        self._own[:] = x
+        self._c.multiply(self._neighbours.known, *self._arrays, pointer(result))
+        self._neighbours.check()
 
 
 class Factor:
-    """The incomplete factor of unknowns that it couples, of a BoxMatrix or of one that only these make up."""
+    """The incomplete factor of `unknowns` per cell of a box, of which it couples so many `together`, and BiCGStab with it."""
 
-    def __init__(self, box: Box, unknowns: int):
-        self.box, self.unknowns = box, unknowns
-        self._c = kernels(box, unknowns)
-        self.inverse = np.zeros((box.cells, unknowns, unknowns))  # of P
-        self._excess = np.zeros_like(self.inverse)  # P^-1 D - 2
-        self._swept = np.zeros((1, 4, box.cells if unknowns == 1 else 0))  # couplings times P^-1
-        self._x, self._nothing = (BoxVector(box, unknowns) for _ in range(2))
-        self._column, self._beyond = (np.zeros((unknowns, box.rows)) for _ in range(2))
-        self._fixed = [pointer(a) for a in (self._swept, self.inverse, self._excess)]  # that sweeps take
-        self._at = [pointer(a) for a in (self._x.all, self._nothing.all, self._column, self._beyond)]
+    def __init__(self, box: Box, unknowns: int, together: int):
+        self.box, self.parts, self.together = box, unknowns // together, together
+        module = kernels(box, together)
+        self._c, self._known = module.lib, module.ffi.new("Factor *")
+        self._neighbours = Neighbourhood(module, box, unknowns * together * box.rows)
+        rows, cells, parts = box.rows, box.cells, self.parts
+        self.inverse = np.zeros((parts, cells, together, together))  # of P
+        self._swept = np.zeros((parts, 4, cells if together == 1 else 0))  # couplings times P^-1
+        wide, narrow = (parts, together, cells + 2 * rows), (parts, together, rows)
+        room = {name: np.zeros((unknowns, cells)) for name in ("y", "p", "v", "t", "r", "shadow")}
+        room |= {"excess": np.zeros_like(self.inverse), "x": np.zeros(wide), "nothing": np.zeros(wide)}
+        room |= {"column": np.zeros(narrow), "beyond": np.zeros(narrow)}
+        room["edges"] = np.zeros((3, parts, rows, together, together))
+        room["inverse"] = self.inverse
+        self._room: dict[str, Any] = {}
+        self._lend(**room)
+        self._known.parts = parts
 
-    def renew(self, couplings: Floats, blocks: Floats) -> None:
-        """Find P for these, as in BoxMatrix; collective."""
-        box, rows = self.box, self.box.rows
-        edge = {START: slice(0, rows), END: slice(box.cells - rows, box.cells)}
-        out = {START: couplings[:, BEFORE], END: couplings[:, AFTER]}
-        beyond = [np.zeros((rows, self.unknowns, self.unknowns)) for _ in (START, END)]
-        made = self.inverse, self._excess, self._swept
-        arrays = [pointer(a) for a in (couplings, blocks, *beyond, *made)]
-        for first, end, earlier, later in box.pieces:
-            for side in earlier:
-                box.take(side, beyond[side])
-            self._c.find_pivots(*box.shape, first, end, RELAXED, *arrays)
-            for side in later:
-                box.give(side, self.inverse[edge[side]] * out[side][:, edge[side]].T[:, None, :])
-        box.finish()
-        if self.unknowns > 1:
-            self._fixed[0] = pointer(couplings)
+    def _lend(self, **arrays: Any) -> None:
+        """Let C have these arrays, by the names that it has for them."""
+        for name, array in arrays.items():
+            self._room[name] = pointer(array, "long" if array.dtype.kind == "i" else "double")
+            setattr(self._known, name, self._room[name])
 
-    def weigh(self, rhs: Floats) -> Floats:
-        """P^-1 times a vector."""
-        if self.unknowns == 1:
-            return self.inverse.ravel() * rhs
-        return np.ascontiguousarray(np.matmul(self.inverse, rhs.T[:, :, None])[:, :, 0].T)
+    def renew(self, couplings: Floats, blocks: Floats, least: float = 0.0) -> None:
+        """Take up a matrix, `couplings` and `blocks` as in BoxMatrix; collective.
 
-    def sweep_back(self, y: Floats) -> Floats:
-        """x of (P + U) x = P y, a view that the next sweep changes; collective."""
-        box, x = self.box, self._x
-        swept, inverse, _ = self._fixed
-        given, made = pointer(y), self._at[0]
-        rows, columns = box.shape
-        for first, end, earlier, later in reversed(box.pieces):
-            for side in later:
-                box.take(side, x.beyond[side])
-            self._c.sweep_back(rows, columns, first, end, START in later, swept, inverse, given, made)
-            for side in earlier:
-                box.give(side, x.column[side])
-        box.finish()
-        return x.own
+        Blocks count between two parts where they are above `least` times the diagonal one of that which acts.
+        """
+        parts, together = self.parts, self.together
+        own = blocks if parts == 1 else np.ascontiguousarray(np.einsum("nii->in", blocks))
+        self._c.renew(
+            *(self._neighbours.known, self._known, RELAXED),
+            *map(pointer, (couplings, own, self._swept)),
+        )
+        self._neighbours.check()
+        self._lend(couplings=self._swept if together == 1 else couplings)
+        pairs, cells, entries = [], [np.zeros(0, np.int64)], [np.zeros(0)]
+        for i in range(parts):
+            for j in range(parts):
+                if i == j:
+                    continue
+                between = blocks[:, i, j]
+                there = np.flatnonzero(np.abs(between) > least * np.abs(blocks[:, j, j]))
+                if len(there):
+                    cells.append(there)
+                    entries.append(between[there] * self.inverse[i, there, 0, 0])
+                    pairs.append([i, j, sum(map(len, cells))])
+        self._lend(
+            pairs=np.array(pairs, np.int64).reshape(-1, 3),
+            cells=np.concatenate(cells),
+            entries=np.concatenate(entries),
+        )
+        self._known.acting = len(pairs)
 
-    def sweep_on(self, y: Floats, result: Floats) -> None:
-        """x + f of (P + L) f = P y + (D - 2 P) x to `result`, x that of `sweep_back`; collective."""
-        self._on(y, self._at[0], result)
-
-    def sweep_on_alone(self, y: Floats, result: Floats) -> None:
-        """f of (P + L) f = P y to `result`; collective."""
-        self._on(y, self._at[1], result)
-
-    def _on(self, y: Floats, x: Any, result: Floats) -> None:
-        """With `x` where C finds it."""
-        box, there = self.box, (self._column, self._beyond)
-        _, _, column, beyond = self._at
-        given, made = pointer(y), pointer(result)
-        rows, columns = box.shape
-        self._column[:] = 0.0
-        for first, end, earlier, later in box.pieces:
-            for side in earlier:
-                box.take(side, there[side])
-            after = beyond if END in earlier else NOTHING
-            self._c.sweep_on(rows, columns, first, end, *self._fixed, after, given, x, column, made)
-            for side in later:
-                box.give(side, self._column)
-        box.finish()
+    def solve(self, rhs: Floats, tolerance: float, least: float) -> tuple[Floats, int, float]:
+        """As BoxSolver.solve, with -1 iterations where it does not converge, and the residual that is left; collective."""
+        x, left = np.empty((self.parts * self.together, self.box.cells)), np.zeros(1)
+        iterations = self._c.solve(
+            *(self._neighbours.known, self._known, pointer(np.ascontiguousarray(rhs))),
+            *(tolerance, least, ITERATIONS, pointer(x), pointer(left)),
+        )
+        self._neighbours.check()
+        return x, int(iterations), float(np.sqrt(left[0]))
 
 
 class BoxSolver:
@@ -166,11 +135,8 @@ class BoxSolver:
 
     def __init__(self, matrix: BoxMatrix, name: str):
         self.matrix, self.name = matrix, name
-        self._c = kernels(matrix.box, 1)
-        self._factors: dict[int, list[Factor]] = {}  # by the number of unknowns of each
+        self._factors: dict[int, Factor] = {}  # by the number of unknowns that each couples
         self._together = 1
-        self._across: list[tuple[int, int, Ints, Floats]] = []
-        self._krylov = BiCGStab(matrix.box.comm, matrix.unknowns * matrix.box.cells, self._seen, name)
 
     def factorise(self, together: bool = False, coupled: float = 0.0) -> None:
         """Take up the matrix as it is now, all unknowns of a cell `together` or each by itself; collective.
@@ -179,48 +145,9 @@ class BoxSolver:
         """
         matrix = self.matrix
         self._together = matrix.unknowns if together else 1
-        for part, factor in self._parts():
-            factor.renew(matrix.couplings[part], np.ascontiguousarray(matrix.blocks[:, part, part]))
-        self._across = []
-        if self._together < matrix.unknowns:
-            self._across = list(self._couplings(coupled))
-
-    def _couplings(self, least: float) -> Iterator[tuple[int, int, Ints, Floats]]:
-        """Unknown, the other that acts on it, cells where that counts, and P^-1 D there."""
-        matrix = self.matrix
-        for i, factor in enumerate(self._factors[1]):
-            for j in range(matrix.unknowns):
-                if i != j:
-                    between = matrix.blocks[:, i, j]
-                    cells = np.flatnonzero(np.abs(between) > least * np.abs(matrix.blocks[:, j, j]))
-                    if len(cells):
-                        yield i, j, cells, between[cells] * factor.inverse[cells, 0, 0]
-
-    def _parts(self) -> Iterator[tuple[slice, Factor]]:
-        """The factors in use and their unknowns."""
-        size, unknowns = self._together, self.matrix.unknowns
-        if size not in self._factors:
-            self._factors[size] = [Factor(self.matrix.box, size) for _ in range(unknowns // size)]
-        for i, factor in enumerate(self._factors[size]):
-            yield slice(i * size, (i + 1) * size), factor
-
-    def _seen(self, y: Floats, result: Floats) -> None:
-        """What BiCGStab sees of the matrix."""
-        shape = self.matrix.unknowns, self.matrix.box.cells
-        given, made = y.reshape(shape), result.reshape(shape)
-        found = self._back(given)
-        if self._across:
-            given = given.copy()
-        for i, j, cells, entries in self._across:
-            self._c.act(
-                len(cells), pointer(cells, "long"), pointer(entries), pointer(found[j]), pointer(given[i])
-            )
-        for part, factor in self._parts():
-            factor.sweep_on(given[part], made[part])
-
-    def _back(self, y: Floats) -> list[Floats]:
-        """x of each unknown."""
-        return [x for part, factor in self._parts() for x in factor.sweep_back(y[part])]
+        if self._together not in self._factors:
+            self._factors[self._together] = Factor(matrix.box, matrix.unknowns, self._together)
+        self._factors[self._together].renew(matrix.couplings, matrix.blocks, coupled)
 
     def solve(self, rhs: Floats, tolerance: float, least: float = 0.0) -> tuple[Floats, int]:
         """The solution (unknowns, cells) from a guess of nothing, and the number of iterations; collective. Raises ConvergenceError.
@@ -228,14 +155,12 @@ class BoxSolver:
         It leaves a residual r below `tolerance` of its first one or below `least`, in the 2-norm of (P + L)^-1 r: what it is over
         the pivots when what comes in from cells before is counted, too.
         """
-        shape = self.matrix.unknowns, self.matrix.box.cells
-        seen = np.empty(shape)
-        for part, factor in self._parts():
-            factor.sweep_on_alone(factor.weigh(rhs[part]), seen[part])
-        found, iterations = self._krylov.solve(seen.ravel(), tolerance, least)
-        return np.stack(self._back(found.reshape(shape))), iterations
+        found, iterations, left = self._factors[self._together].solve(rhs, tolerance, least)
+        if iterations < 0:
+            raise ConvergenceError(f"{self.name}: the linear solver stopped at residual {left:.3g}")
+        return found, iterations
 
 
-def kernels(box: Box, unknowns: int) -> Any:
-    """The functions of box_matrix.c for so many unknowns; collective."""
-    return compiled(box.comm, SOURCE, FUNCTIONS, UNKNOWNS=unknowns)
+def kernels(box: Box, together: int) -> Any:
+    """The C for so many unknowns that a factor or a product couples; collective."""
+    return compiled(box.comm, HEADER, *SOURCES, UNKNOWNS=together, HANDLE=HANDLE)

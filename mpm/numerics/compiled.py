@@ -25,29 +25,32 @@ NOTHING = _BUILDER.NULL
 _loaded: dict[tuple[Path, tuple[tuple[str, int], ...]], Any] = {}
 
 
-def compiled(comm: MPI.Comm, source: Path, declarations: str, **constants: int) -> Any:
-    """The functions that `declarations` name, of the C `source` with these `constants` for the preprocessor; collective.
+def compiled(comm: MPI.Comm, header: Path, *sources: Path, **constants: int) -> Any:
+    """A module whose `lib` has the functions of the `header`, without lines for the preprocessor, and whose `ffi` makes its structs: from C
+    `sources`, one after the other, with these `constants` for the preprocessor; collective.
 
     Rank 0 compiles, once for each set of constants, beside and then renames; all ranks share that file system, as they do for forms.
     Raises InputError where nothing can be compiled.
     """
-    known = source, tuple(sorted(constants.items()))
+    known = header, tuple(sorted(constants.items()))
     if known not in _loaded:
-        _loaded[known] = _load(comm, source, declarations, constants)
+        _loaded[known] = _load(comm, header, sources, constants)
     return _loaded[known]
 
 
-def _load(comm: MPI.Comm, source: Path, declarations: str, constants: dict[str, int]) -> Any:
-    text = "".join(f"#define {name} {value}\n" for name, value in constants.items()) + source.read_text()
+def _load(comm: MPI.Comm, header: Path, sources: tuple[Path, ...], constants: dict[str, int]) -> Any:
+    declarations = header.read_text()
+    defined = "".join(f"#define {name} {value}\n" for name, value in constants.items())
+    text = defined + declarations + "".join(source.read_text() for source in sources)
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
     made_of = repr((text, declarations, FLAGS, cffi.__version__, suffix))
-    name = f"{source.stem}_{hashlib.sha256(made_of.encode()).hexdigest()[:16]}"
+    name = f"{header.stem}_{hashlib.sha256(made_of.encode()).hexdigest()[:16]}"
     library = cache_directory() / "compiled" / f"{name}{suffix}"
 
     def build() -> None:
         with suppress(ImportError):  # one that is broken is made again
             if library.exists():
-                _functions(name, library)
+                _module(name, library)
                 return
         builder = cffi.FFI()
         builder.cdef(declarations)
@@ -63,24 +66,24 @@ def _load(comm: MPI.Comm, source: Path, declarations: str, constants: dict[str, 
             raise cannot_compile(error) from error
 
     on_root(comm, build_or_say)
-    functions, error = None, ImportError("another process cannot load it")
+    module, error = None, ImportError("another process cannot load it")
     try:
-        functions = _functions(name, library)
+        module = _module(name, library)
     except ImportError as failed:
         error = failed
-    if any_rank(comm, functions is None):
+    if any_rank(comm, module is None):
         raise cannot_compile(error) from error
-    return functions
+    return module
 
 
-def _functions(name: str, library: Path) -> Any:
-    """Those of a compiled library. Raises ImportError where it is none."""
+def _module(name: str, library: Path) -> Any:
+    """A compiled library. Raises ImportError where it is none."""
     spec = spec_from_file_location(name, library)
     if spec is None or spec.loader is None:
         raise ImportError(f"{library} is no library")
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.lib
+    return module
 
 
 def pointer(values: Floats | Ints, kind: str = "double") -> Any:
