@@ -31,7 +31,8 @@ class Box:
     """This rank's box of a strip with `rows` and `all_columns`, `closed` where its last column is next to its first.
 
     `columns` (n,) are its columns of the strip in the order in which it goes through them, `leftwards` or to the right, its cells column
-    after column from the bottom. `seams` are those at its START and END, None where nobody is. Ranks beyond the number of columns have none.
+    after column from the bottom. `seams` are those at its START and END, None where nobody is. Ranks beyond the number of columns have no
+    cells.
     """
 
     def __init__(self, comm: MPI.Comm, rows: int, all_columns: int, closed: bool):

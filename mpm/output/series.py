@@ -23,7 +23,7 @@ class Series:
     def __init__(self, directory: Path, name: str, precision: str):
         self.directory, self.name, self.precision = directory, name, precision
         self._steps: list[tuple[float, str]] | None = None
-        self._packer = vtu.Packer()
+        self._packer, self._unpacker = vtu.Packer(), vtu.Unpacker()
 
     @property
     def pvd(self) -> Path:
@@ -77,7 +77,7 @@ class Series:
         """One of the listed times, the last one by default."""
         if not self.steps:
             raise InputError(f"{self.pvd}: no {self.name} have been written")
-        return vtu.read_vtu(self.directory / self.steps[index][1])
+        return vtu.read_vtu(self.directory / self.steps[index][1], self._unpacker)
 
     def keep(self, wanted: Callable[[int, float], bool]) -> None:
         """Keep the times whose place in the list and time [s] are `wanted`; files that are then listed no more, or unfinished, go."""

@@ -22,11 +22,16 @@ from mpm.errors import InputError, MpmError
 from mpm.files import write_atomically, write_in_place
 from mpm.labels import from_xml_attribute, xml_attribute
 
-# Intel's ISA-L writes zlib streams nine times as fast as zlib: 3.3 instead of 29 ms for the 16 fields of 49,731 cells, 2 % larger.
+# Intel's ISA-L writes zlib streams nine times as fast as zlib: 3.3 instead of 29 ms for the 16 fields of 49,731 cells, 2 % larger. It reads
+# them in 0.6 of the time.
 try:
     from isal.isal_zlib import compress as compress_fast
+    from isal.isal_zlib import decompress
+    from isal.isal_zlib import error as Damaged
 except ImportError:  # a processor without its wheels (see pyproject.toml)
     from zlib import compress as compress_fast
+    from zlib import decompress
+    from zlib import error as Damaged
 
 VTK_QUAD = 9
 CLOSING = "</Collection>\n</VTKFile>\n"
@@ -143,8 +148,22 @@ class Packer:
         return self._last[name][1]
 
 
-def read_vtu(path: str | Path) -> Snapshot:
-    """Read a file written by `encode_vtu` (this reader knows no other variant of the format)."""
+class Unpacker:
+    """The inverse of a Packer: what is the same as in the file before is unpacked once, and its array, which nobody can change, shared."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, tuple[bytes, NDArray[np.generic]]] = {}  # packed bytes, and array
+
+    def array(self, name: str, packed: bytes, dtype: str) -> NDArray[np.generic]:
+        """Values (n,) from packed bytes. Raises Damaged, and ValueError for bytes that are no whole numbers."""
+        if name not in self._last or self._last[name][0] != packed or self._last[name][1].dtype != dtype:
+            self._last[name] = packed, np.frombuffer(decompress(packed), dtype=dtype)
+        return self._last[name][1]
+
+
+def read_vtu(path: str | Path, unpacker: Unpacker | None = None) -> Snapshot:
+    """Read a file written by `encode_vtu` (this reader knows no other variant of the format); one `unpacker` for many times."""
+    unpacker = unpacker or Unpacker()
     content = Path(path).read_bytes()
     head, _, appended = content.partition(b'<AppendedData encoding="raw">\n_')
     if not appended.endswith(b"</VTKFile>\n"):
@@ -155,17 +174,17 @@ def read_vtu(path: str | Path) -> Snapshot:
         for kind, name, components, offset in re.findall(pattern, head.decode()):
             start = int(offset)
             (_, _, _, size) = struct.unpack_from("<4Q", appended, start)
-            values = np.frombuffer(
-                zlib.decompress(appended[start + 32 : start + 32 + size]), dtype=kind.lower()
-            )
+            values = unpacker.array(name, appended[start + 32 : start + 32 + size], kind.lower())
             arrays[from_xml_attribute(name)] = values.reshape(-1, int(components)) if components else values
         found = re.search(rb'Name="TimeValue"[^>]*>([^<]+)<', head)
         points, quads = arrays.pop("Points"), arrays.pop("connectivity").reshape(-1, 4)
         del arrays["offsets"], arrays["types"]
         time = float(found[1]) if found else float("nan")
-    except (zlib.error, struct.error, KeyError, ValueError, TypeError) as error:
+    except (Damaged, struct.error, KeyError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not a whole .vtu file written by mpm ({error})") from error
-    return Snapshot(points.astype(np.float64), quads.astype(np.int32), arrays, time)
+    return Snapshot(
+        points.astype(np.float64, copy=False), quads.astype(np.int32, copy=False), arrays, time
+    )
 
 
 def encode_pvd(steps: Sequence[tuple[float, str]]) -> str:

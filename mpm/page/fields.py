@@ -21,6 +21,7 @@ from mpm.arrays import Floats
 from mpm.errors import InputError
 from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
+from mpm.page.write import DEFLATED
 
 Maker = Callable[[Run, Snapshot], Floats]
 LEVELS = 4095
@@ -102,7 +103,7 @@ def encode(
     planes = np.ascontiguousarray(
         whole.T
     ).tobytes()  # low bytes, then high bytes: the latter are nearly all alike
-    data = base64.b64encode(zlib.compress(planes, 6)).decode("ascii")
+    data = base64.b64encode(zlib.compress(planes, DEFLATED)).decode("ascii")
     return Encoded(look, low, high, data, tuple(frames))
 
 

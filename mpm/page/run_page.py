@@ -17,7 +17,6 @@ from mpm.page.curves import Chart, curves
 from mpm.page.numbers import Account, Row, accounts, errors, groups
 from mpm.page.strip import Drawing, drawing
 from mpm.page.viewer import BUDGET, viewer
-from mpm.page.warmth import warmth
 from mpm.page.write import render
 from mpm.report.verdict import verdict
 from mpm.screen import HARD_SPACE, Listing, entry
@@ -93,11 +92,20 @@ def run_page(
         groups=groups(run.summary),
         accounts=accounts(run.summary),
         errors=errors(run.summary),
-        charts=[*curves(run, say), *warmth(run)],
+        charts=[*curves(run, say), *_warmth(run)],
         viewer=viewer(run, budget, say=say) if budget else None,
         reproduce=reproduce(run),
         inputs=inputs(run),
     )
+
+
+def _warmth(run: Run) -> list[Chart]:
+    """The curves of temperature, whose module loads matplotlib, of runs that have one."""
+    if run.case.energy is None:
+        return []
+    from mpm.page.warmth import warmth
+
+    return warmth(run)
 
 
 TITLES = (

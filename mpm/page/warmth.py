@@ -12,9 +12,7 @@ KELVIN = "temperature [K]"
 
 
 def warmth(run: Run) -> list[Chart]:
-    """Both charts as far as the files go; none of a run without `[energy]`."""
-    if run.case.energy is None:
-        return []
+    """Both charts of a run with `[energy]`, as far as the files go."""
     return [one for one in (_along(run), _over_time(run)) if one is not None]
 
 

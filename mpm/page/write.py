@@ -18,6 +18,9 @@ from markupsafe import Markup
 from mpm.errors import FULL, InputError
 from mpm.files import write_atomically
 
+DEFLATED = 4
+"""How hard what a page carries is deflated: in less than half the time of zlib's usual 6, 5 % larger."""
+
 
 @cache
 def environment() -> Environment:
@@ -35,7 +38,7 @@ def environment() -> Environment:
 def _plotly() -> str:
     """plotly's script, deflated, as base64: a third of its size in the page, unpacked by the browser."""
     script = files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
-    return base64.b64encode(zlib.compress(script, 6)).decode("ascii")
+    return base64.b64encode(zlib.compress(script, DEFLATED)).decode("ascii")
 
 
 def _part(name: str) -> Markup:
