@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -133,7 +133,7 @@ class SurfaceKinetics:
             slope_two = dphi2(turnover)
             out_q, mean_q = np.empty((count, *theta.shape)), np.empty((count, *theta.shape))
             for r, s in enumerate(self.site):
-                through = share[r, 1 - s]  # d turnover / d q_r
+                through = share[r]  # d turnover / d q_r
                 out_q[r] = through * (-theta * decay + gain * slope_one)
                 mean_q[r] = through * (theta * slope_one + gain * slope_two)
                 out_q[r, 1 - s] += through * one
@@ -165,14 +165,12 @@ class SurfaceKinetics:
     def _pairs(self) -> list[tuple[int, int]]:
         return list(zip(self.gas, self.site, strict=True))
 
-    def _gains(self, rates: Floats, theta: Floats, time: Floats | float) -> tuple[Floats, Floats]:
-        """For two kinds: turnover into each kind over `time` (2, n), and its derivative by each q_r (reactions, 2, n or 1)."""
-        span = np.atleast_1d(np.asarray(time, dtype=float))
+    def _gains(self, rates: Floats, theta: Floats, time: Floats | float) -> tuple[Floats, list[Any]]:
+        """For two kinds: turnover into each kind over `time` (2, n), and its derivative by each q_r, that into the kind which r makes."""
         gain = np.zeros_like(theta)
-        share = np.zeros((len(self.reactions), 2, len(span)))
+        share = [time * self.nu_places[r, 1 - s] for r, s in enumerate(self.site)]
         for r, s in enumerate(self.site):
-            share[r, 1 - s] = span * self.nu_places[r, 1 - s]
-            gain[1 - s] += share[r, 1 - s] * rates[r]
+            gain[1 - s] += share[r] * rates[r]
         return gain, share
 
     def _site_rates(self, concentration: Floats) -> Floats:
@@ -211,12 +209,15 @@ class SurfaceKinetics:
         [0, 1] in floating point too, because rounding is monotone.
         """
         gain, share = self._gains(rates, theta, dt)
-        whole = np.stack([(1.0 + gain[1]) + gain[0], (1.0 + gain[0]) + gain[1]])
-        new = (theta + gain) / whole
+        whole = 1.0 + gain[::-1]
+        whole += gain
+        new = theta + gain
+        new /= whole
         response = np.empty((len(self.reactions), *theta.shape))
         for r, s in enumerate(self.site):
-            change = share[r, 1 - s] * new[s] / whole[0]
-            response[r, 1 - s], response[r, s] = change, -change
+            change = np.multiply(share[r], new[s], out=response[r, 1 - s])
+            change /= whole[0]
+            np.negative(change, out=response[r, s])
         return new, response
 
 
