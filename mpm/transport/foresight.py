@@ -35,8 +35,9 @@ class Past:
             return now + dt / self.dt * (now - self.states[0])
         count = len(self.states) + 1
         then = count * now
+        part = np.empty_like(then)
         for k, state in enumerate(self.states, 2):
-            then += -((-1) ** k) * comb(count, k) * state
+            then += np.multiply(-((-1) ** k) * comb(count, k), state, out=part)
         return then
 
 

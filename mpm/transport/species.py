@@ -43,7 +43,7 @@ NEWTON_LIMIT = 30
 IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 HALVINGS = 6
 # residual below which steps need no balanced cells; of general rate laws, which take long in a cell, the first balance has most of the gain
-BALANCED = 1e-4
+BALANCED = 1e-2
 TURNED = 16.0  # times all places per step, from whose coverages the events of general laws follow: what rounding is of
 
 

@@ -30,6 +30,7 @@ class BoxFluxes:
         across = ~faces.vertical_flow
         left, right = (AFTER, BEFORE) if strip.box.leftwards else (BEFORE, AFTER)
         numbers = np.arange(len(faces.behind))
+        self._taken = np.zeros(2 * len(numbers) + 1)
         # of each coupling its place among what faces take from behind, then from ahead, then a zero
         self._places = np.full((4, own), 2 * len(numbers))
         for side, cell, between in (
@@ -41,10 +42,12 @@ class BoxFluxes:
             mine = numbers[between & (cell < own)]
             self._places[side, cell[mine]] = mine + (len(numbers) if cell is faces.behind else 0)
 
-    def couplings(self, operator: FluxOperator) -> Floats:
-        """Of a BoxMatrix, (4, own) [m2/s]."""
-        taken = np.concatenate([operator.from_behind, operator.from_ahead, [0.0]])
-        return np.asarray(-taken[self._places])
+    def enter(self, operator: FluxOperator, couplings: Floats) -> None:
+        """Make `couplings` of a BoxMatrix, (4, own) [m2/s], those of an operator."""
+        faces = len(operator.from_behind)
+        np.negative(operator.from_behind, out=self._taken[:faces])
+        np.negative(operator.from_ahead, out=self._taken[faces:-1])
+        np.take(self._taken, self._places, out=couplings, mode="clip")
 
 
 class StepMatrix:
@@ -85,7 +88,7 @@ class StepMatrix:
         if (self.version, self._dt) == (operator.version, dt):
             return
         if self.version != operator.version:
-            self.matrix.couplings[0] = self._fluxes.couplings(operator)
+            self._fluxes.enter(operator, self.matrix.couplings[0])
         held = self.strip.gas_volume[: self.strip.owned] if storage is None else storage
         self.diagonal[:] = operator.outflow + held / dt
         self.version, self._dt = operator.version, dt
