@@ -131,11 +131,16 @@ def test_own_reader_returns_what_was_written(run: RunDirectory, grid: Grid) -> N
 
 def test_what_changes_under_a_known_name_is_written_anew() -> None:
     """Fails when one packer for many times writes an old array of the same name, or compresses again what has stayed the same."""
-    packer = Packer()
-    first = packer.block("C_TMA", b"one" * 100)
-    assert packer.block("C_TMA", b"one" * 100) is first
-    assert packer.block("C_TMA", b"two" * 100) != first
-    assert packer.block("C_TMA", b"one" * 100) == first
+    packer, values = Packer(), np.ones(100)
+    first = packer.block("C_TMA", values)
+    assert packer.block("C_TMA", np.ones(100)) is first
+    values[3] = 2.0  # in the array that it has seen
+    assert packer.block("C_TMA", values) != first
+    assert packer.block("C_TMA", np.ones(100)) == first
+    values.flags.writeable = False
+    fixed = packer.block("C_TMA", values)
+    assert packer.block("C_TMA", values.ravel()) is fixed
+    assert packer.block("C_TMA", values[:50]) != fixed
 
 
 @pytest.mark.parametrize("kind", ["nothing", "zeros", "noise", "ramp", "field"])
@@ -144,17 +149,18 @@ def test_any_reader_of_zlib_finds_what_was_packed(kind: str, lasting: bool) -> N
     """Fails when a block, written by whatever is fastest here, is no zlib stream of the raw bytes, or other bytes the second time."""
     rng = np.random.default_rng(7)
     wave = np.sin(np.linspace(0.0, 30.0, 50_000)) * np.exp(-np.linspace(0.0, 200.0, 50_000))
-    raw = {
-        "nothing": b"",
-        "zeros": bytes(1_200_000),
-        "noise": rng.bytes(1_200_000),
-        "ramp": np.arange(300_000, dtype=np.int32).tobytes(),
-        "field": wave.astype(np.float32).tobytes(),
+    values = {
+        "nothing": np.zeros(0, np.float32),
+        "zeros": np.zeros(300_000, np.float32),
+        "noise": np.frombuffer(rng.bytes(1_200_000), np.int32),
+        "ramp": np.arange(300_000, dtype=np.int32),
+        "field": wave.astype(np.float32),
     }[kind]
-    block = Packer().block("C_TMA", raw, lasting)
+    block = Packer().block("C_TMA", values, lasting)
+    raw = values.tobytes()
     assert list(np.frombuffer(block, "<u8", 4)) == [1, len(raw), 0, len(block) - 32]
     assert zlib.decompress(block[32:]) == raw
-    assert Packer().block("C_TMA", raw, lasting) == block
+    assert Packer().block("C_TMA", values, lasting) == block
 
 
 def test_numbers_of_a_grid_do_not_swell_the_files() -> None:
@@ -473,3 +479,12 @@ def test_write_atomically_leaves_the_old_file_when_it_fails(tmp_path: Path) -> N
     with pytest.raises(UnicodeEncodeError):
         write_atomically(path, "new \ud800")
     assert path.read_text() == "old"
+
+
+def test_what_did_not_change_is_unpacked_once(run: RunDirectory) -> None:
+    """Fails when reading many times unpacks the mesh again each time, hands out arrays that can be changed, or an old array."""
+    first, second = run.read_fields(0), run.read_fields(1)
+    assert second.cell_data["zone"] is first.cell_data["zone"]
+    assert not first.cell_data["zone"].flags.writeable
+    assert not np.array_equal(second.cell_data["C_TMA"], first.cell_data["C_TMA"])
+    assert np.array_equal(run.read_fields(0).cell_data["C_TMA"], first.cell_data["C_TMA"])

@@ -68,14 +68,13 @@ class Factor:
         rows, cells, parts = box.rows, box.cells, self.parts
         self.inverse = np.zeros((parts, cells, together, together))  # of P
         self._swept = np.zeros((parts, 4, cells if together == 1 else 0))  # couplings times P^-1
-        wide, narrow = (parts, together, cells + 2 * rows), (parts, together, rows)
-        room = {name: np.zeros((unknowns, cells)) for name in ("y", "p", "v", "t", "r", "shadow")}
-        room |= {"excess": np.zeros_like(self.inverse), "x": np.zeros(wide), "nothing": np.zeros(wide)}
-        room |= {"column": np.zeros(narrow), "beyond": np.zeros(narrow)}
-        room["edges"] = np.zeros((3, parts, rows, together, together))
-        room["inverse"] = self.inverse
+        wide: tuple[int, ...] = (parts, together, cells + 2 * rows)
+        narrow = (parts, together, rows)
+        shapes = dict.fromkeys(("x", "nothing"), wide) | dict.fromkeys(("column", "beyond"), narrow)
+        shapes |= dict.fromkeys(("y", "p", "v", "t", "r", "shadow"), (unknowns, cells))
+        shapes |= {"excess": self.inverse.shape, "edges": (3, parts, rows, together, together)}
         self._room: dict[str, Any] = {}
-        self._lend(**room)
+        self._lend(inverse=self.inverse, **{name: np.zeros(shape) for name, shape in shapes.items()})
         self._known.parts = parts
 
     def _lend(self, **arrays: Any) -> None:

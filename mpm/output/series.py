@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mpm.errors import ConvergenceError, InputError
 from mpm.files import write_atomically
@@ -17,6 +17,28 @@ if TYPE_CHECKING:
     from mpm.mesh.grid import Grid
 
 
+class Mesh(NamedTuple):
+    """What a file says of its grid: points (n, 3) [m], corners of the cells (cells, 4), numbers of their zones and layers (cells,)."""
+
+    points: NDArray[np.float64]
+    quads: NDArray[np.int32]
+    zone: NDArray[np.int32]
+    layer: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, grid: Grid, displacement: Sequence[float]) -> Mesh:
+        """Arrays that nobody can change: the same ones need to be packed only once."""
+        made = cls(
+            vtu.grid_points(grid.x, grid.y, displacement),
+            vtu.grid_quads(grid.columns, grid.rows),
+            np.tile(grid.zone_of_column, grid.rows).astype(np.int32),
+            np.repeat(grid.row_layer, grid.columns).astype(np.int32),
+        )
+        for array in made:
+            array.flags.writeable = False
+        return made
+
+
 class Series:
     """The series `name` in the directory of a run; `precision` (Float32, Float64) is that of the fields on disk."""
 
@@ -24,6 +46,7 @@ class Series:
         self.directory, self.name, self.precision = directory, name, precision
         self._steps: list[tuple[float, str]] | None = None
         self._packer, self._unpacker = vtu.Packer(), vtu.Unpacker()
+        self._written: tuple[Grid, tuple[float, ...], Mesh] | None = None  # the mesh of the last file
 
     @property
     def pvd(self) -> Path:
@@ -52,26 +75,21 @@ class Series:
         how many there were before.
         """
         name = f"{self.name}/{self.name}_{len(self.steps) if number is None else number:06d}.vtu"
-        data = {
-            "zone": np.tile(grid.zone_of_column, grid.rows),
-            "layer": np.repeat(grid.row_layer, grid.columns),
-            **cell_data,
-        }
+        mesh = self._mesh(grid, tuple(displacement))
         for key, values in cell_data.items():
             check_finite(values, f"{name}: {key}")
-        points = vtu.grid_points(grid.x, grid.y, displacement)
-        content = vtu.encode_vtu(
-            points,
-            vtu.grid_quads(grid.columns, grid.rows),
-            data,
-            float(time),
-            self.precision,
-            self._packer,
-        )
+        data = {"zone": mesh.zone, "layer": mesh.layer, **cell_data}
+        content = vtu.encode_vtu(mesh.points, mesh.quads, data, float(time), self.precision, self._packer)
         (self.directory / self.name).mkdir(exist_ok=True)
         write_atomically(self.directory / name, content)
         self.steps.append((float(time), name))
         vtu.add_to_pvd(self.pvd, self.steps)
+
+    def _mesh(self, grid: Grid, displacement: tuple[float, ...]) -> Mesh:
+        """That of a time; the last one where that is the same."""
+        if self._written is None or self._written[0] is not grid or self._written[1] != displacement:
+            self._written = grid, displacement, Mesh.of(grid, displacement)
+        return self._written[2]
 
     def read(self, index: int = -1) -> vtu.Snapshot:
         """One of the listed times, the last one by default."""

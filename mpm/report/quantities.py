@@ -244,6 +244,7 @@ def _match(name: str) -> tuple[Quantity, Mapping[str, str]] | None:
     return None
 
 
+@lru_cache(maxsize=4096)
 def quantity(name: str, steady: bool = False) -> Quantity:
     """The entry for a dotted name, with the case's names put in; `steady`: amounts are per second.
 

@@ -114,7 +114,9 @@ class Reactions:
             made = np.zeros((nu.shape[1], self.strip.owned))
             made[:, cells] = on_surfaces
             return made
-        made = np.asarray(np.einsum("ri,rn->in", nu, events.gas))  # of one reaction thrice as fast as a product of matrices
+        made = np.asarray(
+            np.einsum("ri,rn->in", nu, events.gas)
+        )  # of one reaction thrice as fast as a product of matrices
         made[:, cells] += on_surfaces
         return made
 
@@ -158,5 +160,7 @@ def _slopes(nu: Floats, slopes: Floats, size: Floats) -> Floats:
     """sum_r nu_ri slopes_rj, per cell and times its size: (n, i, j) from (reactions, i) and (reactions, j, n)."""
     if not len(nu):
         return np.zeros((len(size), nu.shape[1], slopes.shape[1]))
-    by_species = (nu.T @ slopes.reshape(len(nu), -1)).reshape(nu.shape[1], *slopes.shape[1:])  # faster than einsum
+    by_species = (nu.T @ slopes.reshape(len(nu), -1)).reshape(
+        nu.shape[1], *slopes.shape[1:]
+    )  # faster than einsum
     return np.asarray(np.moveaxis(by_species * size, -1, 0))
