@@ -1,4 +1,5 @@
-"""Reductions and gathers over the ranks: whatever all of them take part in. What neighbours tell each other is in `mpm.numerics.box`."""
+"""Reductions and gathers over the ranks: whatever all of them take part in. What neighbours tell each other while they solve, and
+the sums that this takes, are in `numerics/box.c`."""
 
 from __future__ import annotations
 

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 from mpm.errors import ConvergenceError
 from mpm.numerics import box_matrix
 from mpm.numerics.box import Box, column_owners
-from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver, Factor
+from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver, Factor, kernels
+from mpm.numerics.compiled import pointer
+from mpm.numerics.messages import Neighbourhood
 from mpm.transport.schemes import two_point_flux
 
 from mpi4py import MPI  # isort: skip  (after fem)
@@ -144,6 +146,43 @@ def test_what_does_not_converge() -> None:
         solver.factorise()
     with pytest.raises(ConvergenceError, match="a test: the linear solver stopped"):
         solver.solve(np.ones((1, 12)), 1e-9)
+
+
+@pytest.mark.parametrize("seed", [231, 360, 401, 806, 808, 901])
+def test_overflow_is_no_solution(seed: int) -> None:
+    """Fails when numbers beyond all bounds end as solved: these systems have some in the second half of an iteration."""
+    draw = np.random.default_rng(seed)
+    matrix = BoxMatrix(Box(MPI.COMM_SELF, 2, 2, False), 2)
+    couplings = matrix.couplings.reshape(2, 4, 2, 2)
+    couplings[:, BEFORE, 1, :], couplings[:, AFTER, 0, :] = -draw.random((2, 2)), -draw.random((2, 2))
+    couplings[:, BELOW, :, 1], couplings[:, ABOVE, :, 0] = -draw.random((2, 2)), -draw.random((2, 2))
+    matrix.blocks[:] = 10 ** draw.uniform(0, 12) * (draw.random((4, 2, 2)) - 0.5)
+    matrix.blocks[:, [0, 1], [0, 1]] = 2 + draw.random((4, 2))
+    solver = BoxSolver(matrix, "a test")
+    solver.factorise()
+    with pytest.raises(ConvergenceError, match=r"after \d+ iterations"):
+        solver.solve(10 ** draw.uniform(138, 154) * draw.random((2, 4)), 1e-7)
+
+
+@pytest.mark.parallel(alone=False)
+def test_what_mpi_tells_of_is_raised_once() -> None:
+    """Fails when an error of MPI goes unseen, or ends what comes after it."""
+    box = Box(WORLD, 3, 4 * WORLD.size, False)
+    module = kernels(box, 1)
+    neighbours = Neighbourhood(module, box, box.rows)
+    known, there = neighbours.known, list(neighbours.known.neighbour)
+    couplings, blocks, result = np.ones((1, 4, box.cells)), np.ones((box.cells, 1, 1)), np.empty(box.cells)
+    x = np.ones(box.cells + 2 * box.rows)
+    arrays = [pointer(array) for array in (couplings, blocks, x, result)]
+    known.neighbour = [WORLD.size, WORLD.size]
+    module.lib.multiply(known, *arrays)
+    with pytest.raises(MPI.Exception):
+        neighbours.check()
+    known.neighbour = there
+    x[:] = 1.0
+    module.lib.multiply(known, *arrays)
+    neighbours.check()
+    np.testing.assert_array_equal(result, 5.0)
 
 
 def strip_matrix(velocity: float, storage: float) -> BoxMatrix:

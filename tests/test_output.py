@@ -137,6 +137,11 @@ def test_what_changes_under_a_known_name_is_written_anew() -> None:
     values[3] = 2.0  # in the array that it has seen
     assert packer.block("C_TMA", values) != first
     assert packer.block("C_TMA", np.ones(100)) == first
+    view = values[:]
+    view.flags.writeable = False
+    seen = packer.block("C_TMA", view)
+    values[3] = 3.0  # below a view that cannot be written
+    assert packer.block("C_TMA", view) != seen
     values.flags.writeable = False
     fixed = packer.block("C_TMA", values)
     assert packer.block("C_TMA", values.ravel()) is fixed

@@ -66,9 +66,10 @@ static void give(Box *box, int side, int lists, int count, long width, const dou
         memcpy(message + (long)i * count, values + i * width, count * sizeof(double));
     if (box->neighbour[side] == box->rank)
         return; /* it stays where it is until it is taken */
-    told(box, ((Isend)box->isend)(message, lists * count, (Handle)box->number, box->neighbour[side], box->facing[side],
-                                  (Handle)box->communicator, &box->request[side]));
-    box->open[side] = 1;
+    const int error = ((Isend)box->isend)(message, lists * count, (Handle)box->number, box->neighbour[side], box->facing[side],
+                                          (Handle)box->communicator, &box->request[side]);
+    told(box, error);
+    box->open[side] = !error;
 }
 
 /* Receive the like from across the seam at `side`, in the order in which it was given. */

@@ -115,7 +115,7 @@ class Factor:
         self._known.acting = len(pairs)
 
     def solve(self, rhs: Floats, tolerance: float, least: float) -> tuple[Floats, int, float]:
-        """As BoxSolver.solve, with -1 iterations where it does not converge, and the residual that is left; collective."""
+        """As BoxSolver.solve, with -1 - n for n iterations that do not converge, and the residual that is left; collective."""
         x, left = np.empty((self.parts * self.together, self.box.cells)), np.zeros(1)
         iterations = self._c.solve(
             *(self._neighbours.known, self._known, pointer(np.ascontiguousarray(rhs))),
@@ -156,7 +156,9 @@ class BoxSolver:
         """
         found, iterations, left = self._factors[self._together].solve(rhs, tolerance, least)
         if iterations < 0:
-            raise ConvergenceError(f"{self.name}: the linear solver stopped at residual {left:.3g}")
+            raise ConvergenceError(
+                f"{self.name}: the linear solver stopped after {-1 - iterations} iterations at residual {left:.3g}"
+            )
         return found, iterations
 
 

@@ -166,8 +166,8 @@ FAST void second_half(long n, double alpha, double omega, double beta, const dou
 }
 
 /* A x = rhs from a guess of nothing, x (parts, UNKNOWNS, cells). It stops where the 2-norm of the residual, over P + L, is not above
-   `tolerance` times its first one, or `least`. Returns the number of iterations, or -1 after more than `limit` or where numbers are none;
-   `left` becomes the square of that norm. */
+   `tolerance` times its first one, or `least`. Returns the number of iterations n, or -1 - n where more than `limit` would be needed or numbers
+   are none; `left` becomes the square of that norm. */
 int solve(Box *box, Factor *factor, const double *rhs, double tolerance, double least, int limit, double *x, double *left)
 {
     const int parts = factor->parts;
@@ -216,7 +216,9 @@ int solve(Box *box, Factor *factor, const double *rhs, double tolerance, double 
         const double omega = sums[1] > 0.0 ? sums[0] / sums[1] : 0.0;
         const double now = sums[2] - omega * sums[3], beta = omega != 0.0 ? now / rho * alpha / omega : 0.0;
         second_half(n, alpha, omega, beta, v, t, x, r, p);
-        square = fmax(half - omega * sums[0], ROUNDING * half);
+        square = half - omega * sums[0];
+        if (square < ROUNDING * half) /* what is no number stays so */
+            square = ROUNDING * half;
         rho = omega != 0.0 ? now : 0.0; /* else it starts again */
     }
     go_back(box, factor, x);
@@ -224,7 +226,7 @@ int solve(Box *box, Factor *factor, const double *rhs, double tolerance, double 
         memcpy(x + i * cells, factor->x + i * width + box->rows, cells * sizeof(double));
     finish(box);
     *left = square;
-    return done ? iteration : -1;
+    return done ? iteration : -1 - iteration;
 }
 
 /* A x to `result`; x (UNKNOWNS, rows + cells + rows) gets the columns of neighbours. */

@@ -19,9 +19,8 @@ from mpm.parallel import any_rank, on_root
 
 from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
-FLAGS = ["-O3", "-fno-math-errno", "-ffp-contract=fast", "-fopenmp-simd"]
+FLAGS = ["-O3", "-fno-math-errno", "-ffp-contract=fast", "-fopenmp-simd", "-fvisibility=hidden"]
 _BUILDER = cffi.FFI()
-NOTHING = _BUILDER.NULL
 _loaded: dict[tuple[Path, tuple[tuple[str, int], ...]], Any] = {}
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mpm.errors import MpmError
 from mpm.numerics.box import Box
 from mpm.numerics.compiled import pointer
 
@@ -19,11 +20,16 @@ HANDLE = MPI._sizeof(MPI.Comm)
 
 @cache
 def addresses() -> dict[str, int]:
-    """Those of the functions of MPI that box.c calls, by the names that it has for them."""
+    """Those of the functions of MPI that box.c calls, by the names that it has for them. Raises MpmError where they cannot be found."""
     library = ctypes.CDLL(MPI.__file__)
     names = {"isend": "MPI_Isend", "recv": "MPI_Recv", "wait": "MPI_Wait", "allreduce": "MPI_Allreduce"}
-    found = {key: ctypes.cast(getattr(library, name), ctypes.c_void_p).value for key, name in names.items()}
-    return {key: address for key, address in found.items() if address is not None}
+    try:
+        found = {key: ctypes.cast(getattr(library, name), ctypes.c_void_p) for key, name in names.items()}
+    except AttributeError as error:
+        raise MpmError(
+            f"{MPI.__file__}: this build of mpi4py hides the functions of MPI ({error})"
+        ) from error
+    return {key: address.value or 0 for key, address in found.items()}
 
 
 class Neighbourhood:
@@ -47,6 +53,7 @@ class Neighbourhood:
             setattr(known, name, cast("void *", address))
 
     def check(self) -> None:
-        """Raise what MPI has told of since the start."""
-        if self.known.error:
-            raise MPI.Exception(self.known.error)
+        """Raise what MPI has told of."""
+        error, self.known.error = self.known.error, 0
+        if error:
+            raise MPI.Exception(error)

@@ -132,8 +132,8 @@ class Packer:
     """Compresses arrays and remembers the last block of each name: mesh and mean flow are the same from time to time."""
 
     def __init__(self) -> None:
-        # array, its bytes, which are compared in a thirtieth of the time that a digest takes, and block
-        self._last: dict[str, tuple[NDArray[np.generic], bytes, bytes]] = {}
+        # array if nobody can change it, its bytes, which are compared in a thirtieth of the time that a digest takes, and block
+        self._last: dict[str, tuple[NDArray[np.generic] | None, bytes, bytes]] = {}
 
     def block(self, name: str, values: NDArray[np.generic], lasting: bool = False) -> bytes:
         """vtkZLibDataCompressor's layout with a single block: [blocks, block size, last partial size, compressed size] + data.
@@ -141,20 +141,24 @@ class Packer:
         What is `lasting`, as the numbers of corners, is compressed once and copied into every file: by zlib, a third smaller.
         """
         last, before, block = self._last.get(name, (None, b"", b""))
-        if last is not None and same_memory(last, values):
+        if last is not None and (last.nbytes, last.ctypes.data) == (values.nbytes, values.ctypes.data):
             return block
         raw = values.tobytes()
-        if last is None or before != raw:
+        if before != raw or not block:
             packed = zlib.compress(raw, 1) if lasting else fast.compress(raw, 1)
             block = struct.pack("<4Q", 1, len(raw), 0, len(packed)) + packed
-        self._last[name] = values, raw, block
+        self._last[name] = values if fixed(values) else None, raw, block
         return block
 
 
-def same_memory(one: NDArray[np.generic], other: NDArray[np.generic]) -> bool:
-    """Whether two contiguous arrays are the same numbers in one place, which nobody can have changed."""
-    fixed = not (one.flags.writeable or other.flags.writeable)
-    return fixed and one.nbytes == other.nbytes and one.ctypes.data == other.ctypes.data
+def fixed(values: NDArray[np.generic]) -> bool:
+    """Whether nobody can change an array: neither it nor what it is a view of is writeable."""
+    part: Any = values
+    while isinstance(part, np.ndarray):
+        if part.flags.writeable:
+            return False
+        part = part.base
+    return part is None
 
 
 class Unpacker:
@@ -191,7 +195,7 @@ def read_vtu(path: str | Path, unpacker: Unpacker | None = None) -> Snapshot:
         time = float(found[1]) if found else float("nan")
     except (fast.error, struct.error, KeyError, ValueError, TypeError) as error:
         raise InputError(f"{path}: not a whole .vtu file written by mpm ({error})") from error
-    return Snapshot(points.astype(np.float64, copy=False), quads.astype(np.int32, copy=False), arrays, time)
+    return Snapshot(points.astype(np.float64), quads.astype(np.int32), arrays, time)
 
 
 def encode_pvd(steps: Sequence[tuple[float, str]]) -> str:
