@@ -225,6 +225,25 @@ def test_equations_are_told_apart_by_speed() -> None:
     np.testing.assert_allclose(equations.corrected(np.zeros((2, 1, 1)), wanted)[:, 0, 0], [3.0, 5.0])
 
 
+@pytest.mark.parametrize(("reactions", "kinds"), [(0, 2), (1, 1), (3, 2), (2, 4), (6, 3), (7, 5)])
+def test_the_fastest_lead_in_every_cell(rng: np.random.Generator, reactions: int, kinds: int) -> None:
+    """Fails when in some cell an equation is no combination of the sites', or the fastest reaction that equations still hold does not
+    lead the next one, or a later one holds it, too."""
+    nu = rng.integers(-2, 3, (reactions, kinds)).astype(float)
+    speed = 10.0 ** rng.uniform(-30, 10, (reactions, 40)) * (rng.random((reactions, 40)) > 0.2)
+    found = combined(nu, speed)
+    for cell in range(40):
+        sites, held = found.of_sites[:, :, cell], found.of_reactions[:, :, cell]
+        np.testing.assert_allclose(sites @ nu.T, held, atol=1e-9)
+        assert abs(np.linalg.det(sites)) > 1e-9
+        for i, lead in enumerate(found.leading[:, cell]):
+            left = held[i:].any(axis=0)
+            assert (lead >= 0) == left.any()
+            if lead >= 0:
+                assert speed[lead, cell] == speed[left, cell].max()
+                assert held[i, lead] != 0.0 and not held[i + 1 :, lead].any()
+
+
 @pytest.mark.parametrize("order", [0.0, 0.5, 0.9, 1.0, 1.7, 2.0, 3.0])
 def test_powers_are_smooth_and_end_at_nothing(order: float) -> None:
     """x^p with its slope, continuous at TRACE, 0 at 0. Fails when a rate goes on where nothing is left."""
@@ -241,10 +260,11 @@ def test_powers_are_smooth_and_end_at_nothing(order: float) -> None:
     assert power(np.zeros(1), order)[0][0] == 0.0 and (np.diff(value) >= 0.0).all()
 
 
-def test_small_systems(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("unknowns", [1, 2, 3, 4, 6])
+def test_small_systems(rng: np.random.Generator, unknowns: int) -> None:
     """Fails when a system of another scale, or next to a singular one, is solved wrongly."""
-    matrix, x = rng.normal(size=(4, 4, N)), rng.normal(size=(4, 2, N))
-    matrix *= 10.0 ** rng.uniform(-9, 9, (4, 1, N))
+    matrix, x = rng.normal(size=(unknowns, unknowns, N)), rng.normal(size=(unknowns, 2, N))
+    matrix *= 10.0 ** rng.uniform(-9, 9, (unknowns, 1, N))
     rhs = np.einsum("ijn,jmn->imn", matrix, x)
     np.testing.assert_allclose(solve_cells(matrix, rhs), x, rtol=1e-7, atol=1e-9)
     matrix[:, :, 3] = 0.0

@@ -11,11 +11,11 @@ for microseconds and steps of years, which is a steady state, all of it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from mpm.arrays import Floats, Ints
-from mpm.physics.small_systems import swap_rows
 
 NOTHING = 1e-12  # of a combined coefficient: what rounding leaves of one that is zero
 
@@ -42,35 +42,95 @@ class Combined:
         of each equation, the slowest first."""
         result, cells = values.copy(), np.arange(values.shape[2])
         for i in reversed(range(len(self.leading))):
-            chosen = cells[self.leading[i] >= 0]
-            leads = self.leading[i, chosen]
-            terms = np.einsum("rn,rmn->mn", self.of_reactions[i][:, chosen], result[:, :, chosen])
-            missing = (wanted[i][:, chosen] - terms) / self.of_reactions[i, leads, chosen]
+            some = self.leading[i] >= 0
+            if not some.any():
+                continue
+            there = slice(None) if some.all() else cells[some]
+            leads, chosen = self.leading[i, there], cells[there]
+            terms = np.einsum("rn,rmn->mn", self.of_reactions[i][:, there], result[:, :, there])
+            missing = (wanted[i][:, there] - terms) / self.of_reactions[i, leads, chosen]
             result[leads, :, chosen] += missing.T
         return result
+
+
+class Orders:
+    """How the equations of sites with stoichiometry `nu` (reactions, sites) are combined, for every order in which reactions have led so
+    far: a tree that starts with none of them, in which branches are made when they are first met.
+
+    Of each order `of_sites` is T (equations, sites), `of_reactions` T nu^T (equations, reactions), `leading` what has led, -1 for nothing,
+    `left` which reactions may lead next, and `next` (reactions + 1,) the order that comes of it, the last of nothing, -1 if not yet made.
+    """
+
+    def __init__(self, nu: Floats):
+        self.of_sites: list[Floats] = []
+        self.of_reactions: list[Floats] = []
+        self.leading: list[tuple[int, ...]] = []
+        self.left: list[Ints] = []
+        self.next: list[Ints] = []
+        self._add(np.eye(nu.shape[1]), nu.T.copy(), ())
+
+    def _add(self, sites: Floats, reactions: Floats, leading: tuple[int, ...]) -> int:
+        self.of_sites.append(sites)
+        self.of_reactions.append(reactions)
+        self.leading.append(leading)
+        self.left.append(np.flatnonzero(reactions[len(leading) :].any(axis=0)))
+        self.next.append(np.full(reactions.shape[1] + 1, -1))
+        return len(self.leading) - 1
+
+    def led_by(self, order: int, lead: int) -> int:
+        """The order that comes of `order` where reaction `lead` is next: the first equation that is left holds it, no later one does."""
+        if self.next[order][lead] >= 0:
+            return int(self.next[order][lead])
+        sites, reactions = self.of_sites[order].copy(), self.of_reactions[order].copy()
+        i = len(self.leading[order])
+        if lead >= 0:
+            row = i + int(np.abs(reactions[i:, lead]).argmax())
+            for rows in (sites, reactions):
+                rows[[i, row]] = rows[[row, i]]
+            factors = reactions[i + 1 :, lead] / reactions[i, lead]
+            sites[i + 1 :] -= factors[:, None] * sites[i]
+            reactions[i + 1 :] -= factors[:, None] * reactions[i]
+            reactions[i + 1 :][np.abs(reactions[i + 1 :]) < NOTHING] = 0.0
+        self.next[order][lead] = self._add(sites, reactions, (*self.leading[order], lead))
+        return int(self.next[order][lead])
+
+    def fastest(self, speed: Floats) -> Ints:
+        """The order of each cell (n,) where the fastest of the reactions that are left leads, `speed` (reactions, n)."""
+        found = np.zeros(speed.shape[1], dtype=np.intp)
+        for _ in range(self.of_sites[0].shape[0] if len(speed) else 0):
+            before = found.copy()
+            here = np.flatnonzero(np.bincount(before))
+            for order in here.tolist():
+                cells = np.flatnonzero(before == order) if len(here) > 1 else slice(None)
+                found[cells] = self._next(order, speed[self.left[order]][:, cells])
+        return found
+
+    def _next(self, order: int, speed: Floats) -> Ints | int:
+        """What comes of one order in its cells, where the reactions that are left have this `speed` (left, n)."""
+        if not len(speed):
+            return self.led_by(order, -1)
+        leads = self.left[order][speed.argmax(axis=0)]
+        for lead in np.flatnonzero(np.bincount(leads)).tolist():
+            self.led_by(order, lead)
+        return self.next[order][leads]
+
+
+@lru_cache(maxsize=64)
+def _orders(nu: bytes, shape: tuple[int, int]) -> Orders:
+    return Orders(np.frombuffer(nu).reshape(shape))
 
 
 def combined(nu: Floats, speed: Floats) -> Combined:
     """The equations of sites with stoichiometry `nu` (reactions, sites), in cells where reactions have this gross `speed` (reactions,
     n)."""
-    kinds, n = nu.shape[1], speed.shape[1]
-    cells = np.arange(n)
-    reactions = np.repeat(nu.T[:, :, None], n, axis=2)
-    sites = np.repeat(np.eye(kinds)[:, :, None], n, axis=2)
-    leading = np.full((kinds, n), -1)
-    for i in range(kinds if len(nu) else 0):
-        left = np.abs(reactions[i:]).max(axis=0) > 0.0
-        speeds = np.where(left, speed, -1.0)
-        fastest = speeds.argmax(axis=0)
-        some = left[fastest, cells]
-        row = i + np.abs(reactions[i:, fastest, cells]).argmax(axis=0)
-        swap_rows(reactions, i, row)
-        swap_rows(sites, i, row)
-        leading[i] = np.where(some, fastest, -1)
-        pivot = np.where(some, reactions[i, fastest, cells], 1.0)
-        for j in range(i + 1, kinds):
-            factor = np.where(some, reactions[j, fastest, cells], 0.0) / pivot
-            reactions[j] -= factor * reactions[i]
-            sites[j] -= factor * sites[i]
-            reactions[j][np.abs(reactions[j]) < NOTHING] = 0.0
-    return Combined(sites, reactions, leading)
+    orders, kinds = _orders(np.ascontiguousarray(nu, dtype=float).tobytes(), nu.shape), nu.shape[1]
+    found = orders.fastest(speed)
+    used = np.flatnonzero(np.bincount(found)) if len(found) else np.zeros(1, dtype=np.intp)
+    place = np.searchsorted(used, found)
+    none = (-1,) * kinds
+    leading = np.array([(*orders.leading[order], *none)[:kinds] for order in used], dtype=np.intp)
+    sites, reactions = (
+        np.take(np.stack([one[order] for order in used], axis=-1), place, axis=-1)
+        for one in (orders.of_sites, orders.of_reactions)
+    )
+    return Combined(sites, reactions, leading.T[:, place])
