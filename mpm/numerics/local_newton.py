@@ -31,11 +31,12 @@ def balance_locally(
     b = len(concentration)
     c, active = concentration.copy(), np.arange(concentration.shape[1])
     for _ in range(tries):
-        source, slope = sources(c[:, active], active)
-        held = diagonal[:, active] * c[:, active]
-        residual = held - inflow[:, active] - source
+        now, came = c.take(active, axis=1), inflow.take(active, axis=1)
+        source, slope = sources(now, active)
+        held = diagonal.take(active, axis=1) * now
+        residual = held - came - source
         # cells whose reactions were not found keep what they have
-        loose = (np.abs(residual) > TIGHT * (held + inflow[:, active]) + idle).any(axis=0)
+        loose = (np.abs(residual) > TIGHT * (held + came) + idle).any(axis=0)
         active = active[loose]
         if not len(active):
             break

@@ -177,8 +177,8 @@ class GeneralKinetics:
         """Newton's method in all cells from `guess`; coverages (sites, n) and the cells in which it did not arrive."""
         new, active, part = guess.copy(), np.arange(theta.shape[1]), self
         for tries in range(TRIES):
-            now = new[:, active]
-            change = part._change(gas, theta[:, active], now, dt[active], 0.0)
+            now = new.take(active, axis=1)
+            change = part._change(gas, theta.take(active, axis=1), now, dt[active], 0.0)
             new[:, active] = after = np.where(change < now, np.minimum(now - change, 1.0), SHRINK * now)
             done = _arrived(change, now, after, tries >= RESTS)
             if done.any():

@@ -48,7 +48,7 @@ class GasPart:
 
     def part(self, chosen: NDArray[np.integer]) -> GasPart:
         """In some of the cells."""
-        return GasPart(self.values[:, chosen], self.slopes[:, :, chosen])
+        return GasPart(self.values.take(chosen, axis=1), self.slopes.take(chosen, axis=2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class RateTable:
         other = object.__new__(RateTable)
         other.__dict__.update(self.__dict__)
         other._sites, other._thermal = self._sites[chosen], self._thermal[chosen]
-        other._constants = self._constants[:, chosen]
+        other._constants = self._constants.take(chosen, axis=1)
         return other
 
     def gas_part(self, concentration: Floats) -> GasPart:

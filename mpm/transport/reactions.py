@@ -110,14 +110,12 @@ class Reactions:
         """What they make of every one of these species, (species, own) [mol/m/s]."""
         nu, cells = self._nu_gas[:, species], self.coverage.cells
         on_surfaces = self._nu_surface[:, species].T @ events.surface
-        if not len(nu):
+        if len(nu):  # of one reaction thrice as fast as a product of matrices
+            made = np.asarray(np.einsum("ri,rn->in", nu, events.gas))
+        else:
             made = np.zeros((nu.shape[1], self.strip.owned))
-            made[:, cells] = on_surfaces
-            return made
-        made = np.asarray(
-            np.einsum("ri,rn->in", nu, events.gas)
-        )  # of one reaction thrice as fast as a product of matrices
-        made[:, cells] += on_surfaces
+        for one, more in zip(made, on_surfaces, strict=True):  # many times as fast as made[:, cells]
+            one[cells] += more
         return made
 
     def slopes(self, surface_slopes: Floats, gas_slopes: Floats) -> Floats:
@@ -142,7 +140,7 @@ class Reactions:
     ) -> tuple[Floats, Floats]:
         """What is made of coupled species in `chosen` reactive cells over a step of `dt` [s] from the coverages `theta` (sites, reactive
         cells) to these concentrations (coupled, n), (coupled, n) [mol/m/s], and its derivatives (n, coupled, coupled) [m2/s]."""
-        rates = self.surface.part(chosen).rates(concentration, theta[:, chosen], dt)
+        rates = self.surface.part(chosen).rates(concentration, theta.take(chosen, axis=1), dt)
         made, slopes = self.on_surfaces(chosen, *rates)
         if not self.gas.reactions:
             return made, slopes

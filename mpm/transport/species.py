@@ -213,7 +213,7 @@ class Transport:
         elif self.reactions.surface.reactions:
             events = self.reactions.without_gas(dt)
         if self.reactions.surface.reactions:
-            self.coverage.react(self.reactions.surface, new[:coupled][:, self.coverage.cells], dt)
+            self.coverage.react(self.reactions.surface, new[:coupled].take(self.coverage.cells, axis=1), dt)
         made = self.reactions.made(events, slice(coupled, None))
         # where more has reacted than was foreseen, more is made
         missed = self.reactions.tied @ (foreseen[:coupled] - new[:coupled])
@@ -241,7 +241,7 @@ class Transport:
         new = possible(foreseen, old)
         self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
         for _ in range(NEWTON_LIMIT):
-            rates, slopes = reactions.surface.rates(new[:, cells], theta, dt)
+            rates, slopes = reactions.surface.rates(new.take(cells, axis=1), theta, dt)
             gas_rates, gas_slopes = reactions.gas.rates(new)
             events = reactions.events(rates, gas_rates)
             made = reactions.made(events, slice(self.coupled))
@@ -277,10 +277,12 @@ class Transport:
         """
         reactions, reactive, theta = self.reactions, self.coverage.cells, self.coverage.theta
         products = self._products(matrices, new)
-        here, before = diagonal[:, reactive], new[:, reactive]
-        inflow = np.maximum(here * before - products[:, reactive] + rhs[:, reactive], 0.0)
+        here, before, carried, held = (
+            values.take(reactive, axis=1) for values in (diagonal, new, products, rhs)
+        )
+        inflow = np.maximum(here * before - carried + held, 0.0)
         chosen = np.flatnonzero(reactions.surface.bends(np.maximum(before, inflow / here), theta, dt))
-        here, before, inflow = here[:, chosen], before[:, chosen], inflow[:, chosen]
+        here, before, inflow = (values.take(chosen, axis=1) for values in (here, before, inflow))
 
         def sources(c: Floats, active: NDArray[np.intp]) -> tuple[Floats, Floats]:
             return reactions.in_cells(chosen[active], c, theta, dt)
