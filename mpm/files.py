@@ -89,17 +89,24 @@ def replacing(path: str | os.PathLike[str], ending: str = ".tmp") -> Iterator[Pa
         raise
 
 
-def write_atomically(path: str | os.PathLike[str], content: bytes | str, *, sync: bool = False) -> None:
-    """Replace `path` by `content` (text is UTF-8) in one step.
+@contextmanager
+def writing(path: str | os.PathLike[str], *, sync: bool = False) -> Iterator[IO[bytes]]:
+    """A stream whose content takes the place of `path` in one step when the block is left.
 
     Other processes see the old file or the new one, whatever happens to this process. `sync` also flushes to the disk before the name
     changes, so that the file survives a power failure; that costs some milliseconds.
     """
     with replacing(path) as temporary, open(temporary, "wb") as stream:
-        stream.write(content.encode() if isinstance(content, str) else content)
+        yield stream
         if sync:
             stream.flush()
             os.fsync(stream.fileno())
+
+
+def write_atomically(path: str | os.PathLike[str], content: bytes | str, *, sync: bool = False) -> None:
+    """Replace `path` by `content` (text is UTF-8) in one step, as `writing` does."""
+    with writing(path, sync=sync) as stream:
+        stream.write(content.encode() if isinstance(content, str) else content)
 
 
 def file_name(text: str) -> str:

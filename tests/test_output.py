@@ -148,6 +148,14 @@ def test_what_changes_under_a_known_name_is_written_anew() -> None:
     assert packer.block("C_TMA", values[:50]) != fixed
 
 
+def test_what_is_not_wanted_is_not_unpacked(run: RunDirectory) -> None:
+    """Fails when a reader that wants some fields gets others, none, or those of another file, or when a name that no file has is an error."""
+    whole, some = run.read_fields(1), run.read_fields(1, ["C_TMA", "nothing"])
+    assert list(some.cell_data) == ["C_TMA"]
+    assert np.array_equal(some.cell_data["C_TMA"], whole.cell_data["C_TMA"])
+    assert np.array_equal(some.quads, whole.quads) and some.time == whole.time
+
+
 @pytest.mark.parametrize("kind", ["nothing", "zeros", "noise", "ramp", "field"])
 @pytest.mark.parametrize("lasting", [False, True])
 def test_any_reader_of_zlib_finds_what_was_packed(kind: str, lasting: bool) -> None:

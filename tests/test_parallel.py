@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mpm import parallel
 from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.parallel import Scatter, on_root, total
@@ -126,16 +127,24 @@ def test_gathers_of_uneven_and_empty_shares() -> None:
     assert nothing.to_all(np.empty((3, 0))).shape == (3, 0)
 
 
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+@pytest.mark.parametrize("at_once", [1, 50, 250_000])
 @pytest.mark.parametrize("lead", [(), (1,), (4,), (3, 2), (0,)])
-def test_gathers_of_any_order_and_shape(lead: tuple[int, ...]) -> None:
-    """Fails when values of cells that lie in any order, on any rank, do not come to their places, or arrays of them are mixed up."""
+def test_gathers_of_any_order_and_shape(
+    lead: tuple[int, ...], at_once: int, kind: type, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fails when values of cells that lie in any order, on any rank, do not come to their places, arrays of them are mixed up, few or many
+    at a time, or they come in another precision."""
+    monkeypatch.setattr(parallel, "AT_ONCE", at_once)
     size = 23
     order = np.random.default_rng(3).permutation(size)
     owner = np.random.default_rng(4).integers(COMM.size, size=size)
     scatter = Scatter(COMM, order[owner == COMM.rank], size)
-    whole = np.random.default_rng(5).random((*lead, size))
+    whole = np.random.default_rng(5).random((*lead, size)).astype(kind)
     local = scatter.to_local(whole)
-    np.testing.assert_array_equal(scatter.to_all(local), whole)
+    everywhere = scatter.to_all(local)
+    np.testing.assert_array_equal(everywhere, whole)
+    assert everywhere.dtype == kind
     root = scatter.to_root(np.asfortranarray(local))
     if COMM.rank == 0:
         np.testing.assert_array_equal(root, whole)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mpm.case.case import Case
     from mpm.case.ports import Inlet
     from mpm.mesh.grid import Grid
+    from mpm.parallel import Scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,20 @@ class FlowField:
     def restored(cls, strip: Strip, stored: Floats) -> FlowField:
         """The field of `stored` in grid order (5, cells), ghosts included."""
         return cls(np.ascontiguousarray(stored[:4, strip.cell]), stored[4, strip.cell].copy())
+
+
+def stored_fields(fields: Sequence[FlowField], scatter: Scatter, own: int) -> Floats | None:
+    """What `FlowField.restored` takes of each field, (fields, 5, cells) in grid order on rank 0, None elsewhere; collective.
+
+    One field after another: those of a cycle are the largest arrays of a run.
+    """
+    whole = None
+    for place, field in enumerate(fields):
+        one = scatter.to_root(field.stored(own))
+        if one is not None:
+            whole = np.empty((len(fields), *one.shape)) if whole is None else whole
+            whole[place] = one
+    return whole
 
 
 def mean_field(fields: Sequence[FlowField]) -> FlowField:

@@ -186,7 +186,7 @@ class HeatedCycle:
         more = np.zeros((4, own)) if self._more is None else self._more[:, :own]
         return {
             **self.density.stored(),
-            "fields": scatter.to_root(cycle.stored(own)),
+            "fields": cycle.stored(scatter, own),
             "rests": cycle.at_rest is not None,
             "found_in": self.density.store(self.found_in),
             "more": scatter.to_root(more),

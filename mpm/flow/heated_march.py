@@ -9,7 +9,7 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
 from mpm.flow.density import Density, moved
-from mpm.flow.fields import FlowField, mean_field
+from mpm.flow.fields import FlowField, mean_field, stored_fields
 from mpm.flow.given import spreading
 from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
 from mpm.flow.state import GasState
@@ -95,10 +95,9 @@ class HeatedMarch:
     def stored(self) -> dict[str, Any]:
         """Arrays of a restart state, in grid order on rank 0 (None elsewhere); collective."""
         own, scatter = self.strip.owned, self.strip.scatter
-        fields = np.stack([field.stored(own) for field in (self.current, *self.recent)])
         return {
             **self.density.stored(),
-            "fields": scatter.to_root(fields),
+            "fields": stored_fields([self.current, *self.recent], scatter, own),
             "found_in": self.density.store(self.found_in),
             "source": scatter.to_root(self._source),
             "done": self.done,

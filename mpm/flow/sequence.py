@@ -6,13 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-
 from mpm.arrays import Floats
 from mpm.flow.courant import check_bounded
 from mpm.flow.cycle import mean_motion, periodic_flow
 from mpm.flow.factors import STEADY
-from mpm.flow.fields import FlowField, mean_field
+from mpm.flow.fields import FlowField, mean_field, stored_fields
 from mpm.flow.problem import CLOSED_PORTS, FlowProblem, PortState
 from mpm.flow.steady import steady_flow
 from mpm.mesh.strip import Strip
@@ -21,6 +19,7 @@ from mpm.motion.schedule import RESTING, Schedule, Step
 
 if TYPE_CHECKING:
     from mpm.case.case import Case
+    from mpm.parallel import Scatter
 
 Watch = Callable[[int, float], None]  # of a cycle's number and what has changed since the one before
 # last change of a velocity, relative to the fastest, of a flow that follows temperatures; Newton's next would be about its square
@@ -99,10 +98,10 @@ class CyclicFlow:
         """Mean over the cycle."""
         return mean_field(self.phases)
 
-    def stored(self, own: int) -> Floats:
-        """The field at rest, where there is one, then the phases."""
+    def stored(self, scatter: Scatter, own: int) -> Floats | None:
+        """The field at rest, where there is one, then the phases (`stored_fields`); collective."""
         first = [] if self.at_rest is None else [self.at_rest]
-        return np.stack([field.stored(own) for field in (*first, *self.phases)])
+        return stored_fields([*first, *self.phases], scatter, own)
 
     @classmethod
     def restored(cls, strip: Strip, stored: Floats, rests: bool) -> CyclicFlow:
@@ -156,9 +155,9 @@ class MarchedFlow:
         """Mean over the last cycle marched."""
         return mean_field(self.recent or [self.current])
 
-    def stored(self, own: int) -> Floats:
-        """The present field, then those of the last cycle."""
-        return np.stack([field.stored(own) for field in (self.current, *self.recent)])
+    def stored(self, scatter: Scatter, own: int) -> Floats | None:
+        """The present field, then those of the last cycle (`stored_fields`); collective."""
+        return stored_fields([self.current, *self.recent], scatter, own)
 
     def restore(self, stored: Floats, done: int) -> None:
         """Go on after `done` steps from the arrays of `stored` in grid order."""

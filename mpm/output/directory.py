@@ -27,7 +27,7 @@ import json
 import logging
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mpm.errors import FULL, InputError, MpmError
-from mpm.files import flush, load_arrays, load_json, lock, write_atomically
+from mpm.files import flush, load_arrays, load_json, lock, write_atomically, writing
 from mpm.output import vtu
 from mpm.output.history import History
 from mpm.output.series import Series, check_finite
@@ -158,9 +158,9 @@ class RunDirectory:
         """Write the fields of one output time and list it in `fields.pvd`, see `Series.write`."""
         self.fields.write(time, grid, cell_data)
 
-    def read_fields(self, index: int = -1) -> vtu.Snapshot:
-        """One of the time steps listed in `fields.pvd`, the last one by default."""
-        return self.fields.read(index)
+    def read_fields(self, index: int = -1, wanted: Collection[str] | None = None) -> vtu.Snapshot:
+        """One of the time steps listed in `fields.pvd`, the last one by default, see `Series.read`."""
+        return self.fields.read(index, wanted)
 
     # ------------------------------------------------------------------ history and summary
 
@@ -209,12 +209,11 @@ class RunDirectory:
         for path in (self.table.path, self.fields.pvd, self.phases.pvd):
             if path.exists():
                 flush(path)
-        buffer = io.BytesIO()
         text = json.dumps(plain(meta, "checkpoint.npz", _refused), allow_nan=False)
         stored: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items()}
         stored[META] = np.frombuffer(text.encode(), dtype=np.uint8)
-        np.savez(buffer, **stored)
-        write_atomically(self.path / "checkpoint.npz", buffer.getvalue(), sync=True)
+        with writing(self.path / "checkpoint.npz", sync=True) as stream:
+            np.savez(stream, **stored)
 
     def read_checkpoint(self) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
         """Arrays and meta of the last restart state, None when there is none."""

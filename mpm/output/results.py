@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,11 +35,12 @@ class Run:
         """Times of the stored fields [s]."""
         return [time for time, _ in self.steps]
 
-    def snapshot(self, index: int = -1) -> Snapshot:
-        """One of the stored fields. Raises InputError when its file is missing, cut, or of another mesh."""
+    def snapshot(self, index: int = -1, wanted: Collection[str] | None = None) -> Snapshot:
+        """The stored fields of one time, all or those that are `wanted`. Raises InputError when its file is missing, cut, or of another
+        mesh."""
         file = self.directory.path / self.steps[index][1]
         try:
-            found = self.directory.read_fields(index)
+            found = self.directory.read_fields(index, wanted)
         except OSError as error:
             raise InputError(f"{file}: {error.strerror}") from None
         if len(found.quads) != self.grid.cells:
@@ -82,7 +83,7 @@ class LastInstant(Run):
         where = RunDirectory("last instant")
         return cls(where, case, grid, history, summary, [(time, "")], {}, held)
 
-    def snapshot(self, index: int = -1) -> Snapshot:
+    def snapshot(self, index: int = -1, wanted: Collection[str] | None = None) -> Snapshot:
         """The last instant, the only one."""
         return self.held
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -91,11 +91,11 @@ class Series:
             self._written = grid, displacement, Mesh.of(grid, displacement)
         return self._written[2]
 
-    def read(self, index: int = -1) -> vtu.Snapshot:
-        """One of the listed times, the last one by default."""
+    def read(self, index: int = -1, wanted: Collection[str] | None = None) -> vtu.Snapshot:
+        """One of the listed times, the last one by default; of its cells' data all, or those that are `wanted`."""
         if not self.steps:
             raise InputError(f"{self.pvd}: no {self.name} have been written")
-        return vtu.read_vtu(self.directory / self.steps[index][1], self._unpacker)
+        return vtu.read_vtu(self.directory / self.steps[index][1], self._unpacker, wanted)
 
     def keep(self, wanted: Callable[[int, float], bool]) -> None:
         """Keep the times whose place in the list and time [s] are `wanted`; files that are then listed no more, or unfinished, go."""

@@ -87,7 +87,7 @@ def shared_bounds(runs: Sequence[Run]) -> dict[str, tuple[float, float]]:
     found: dict[str, tuple[Look, list[float]]] = {}
     for run in runs:
         known = looks(run)
-        film = read_film(run, {name: make for name, (_, make) in known.items()}, VALUES)
+        film = read_film(run, {name: make for name, (_, make) in known.items()}, known, VALUES)
         for name, series in film.series.items():
             look = known[name][0]
             found.setdefault(name, (look, []))[1].extend(extent(look, series))

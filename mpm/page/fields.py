@@ -8,8 +8,7 @@ second stored time, then cells are joined two by two; the page says so.
 from __future__ import annotations
 
 import base64
-import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -19,9 +18,9 @@ from numpy.typing import NDArray
 
 from mpm.arrays import Floats
 from mpm.errors import InputError
+from mpm.output.deflate import small
 from mpm.output.results import Run
 from mpm.output.vtu import Snapshot
-from mpm.page.write import DEFLATED
 
 Maker = Callable[[Run, Snapshot], Floats]
 LEVELS = 4095
@@ -103,7 +102,7 @@ def encode(
     planes = np.ascontiguousarray(
         whole.T
     ).tobytes()  # low bytes, then high bytes: the latter are nearly all alike
-    data = base64.b64encode(zlib.compress(planes, DEFLATED)).decode("ascii")
+    data = base64.b64encode(small(planes)).decode("ascii")
     return Encoded(look, low, high, data, tuple(frames))
 
 
@@ -150,12 +149,16 @@ def chosen_times(count: int, most: int) -> list[int]:
 
 
 def read_film(
-    run: Run, wanted: Mapping[str, Maker], values: int, say: Callable[[str], None] = lambda text: None
+    run: Run,
+    wanted: Mapping[str, Maker],
+    stored: Collection[str],
+    values: int,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Film:
     """Read the stored fields of a run, of each at most about `values` numbers: evenly chosen times, then joined cells.
 
-    `wanted` makes of each snapshot an array of cells (rows, columns) or of corners (one more each). Times whose file is missing or damaged
-    are left out, which one line to `say` tells.
+    `wanted` makes of each snapshot, which holds no more than what is `stored` under these names, an array of cells (rows, columns) or of
+    corners (one more each). Times whose file is missing or damaged are left out, which one line to `say` tells.
     """
     grid = run.grid
     cells = grid.cells
@@ -171,7 +174,7 @@ def read_film(
     times, lost = [], []
     for index in indices:
         try:
-            snapshot = run.snapshot(index)
+            snapshot = run.snapshot(index, stored)
             made = [make(run, snapshot) for make in wanted.values()]
         except InputError as error:
             lost.append(str(error))

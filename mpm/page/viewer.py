@@ -114,7 +114,7 @@ def viewer(
     """
     known = looks(run)
     wanted = {name: make for name, (_, make) in known.items()} | {"streams": stream_maker()}
-    shown = read_film(run, wanted, VALUES, say)
+    shown = read_film(run, wanted, known, VALUES, say)
     if not shown.times:
         return None
     while True:

@@ -107,10 +107,11 @@ def local_fields(system: System) -> dict[str, Floats]:
     return fields
 
 
-def fields(system: System) -> dict[str, Floats]:
-    """All cell fields for the files, in the grid's order, on rank 0 (empty elsewhere)."""
+def fields(system: System, precision: str = "Float64") -> dict[str, Floats]:
+    """All cell fields for the files, in the grid's order and in the `precision` of the files, on rank 0 (empty elsewhere)."""
     local = local_fields(system)
-    values = system.strip.scatter.to_root(np.stack(list(local.values())))
+    stacked = np.stack(list(local.values()), dtype=precision.lower(), casting="same_kind")
+    values = system.strip.scatter.to_root(stacked)
     if values is None:
         return {}
     whole = dict(zip(local, values, strict=True))

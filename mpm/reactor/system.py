@@ -183,7 +183,7 @@ class System:
         if self.thermal is not None:
             parts |= self.thermal.stored()
         elif isinstance(sequence, MarchedFlow | CyclicFlow):
-            parts["flow"]["fields"] = scatter.to_root(sequence.stored(self.strip.owned))
+            parts["flow"]["fields"] = sequence.stored(scatter, self.strip.owned)
         if isinstance(sequence, MarchedFlow):
             parts["flow"]["done"] = sequence.done
         if dispersion is not None:

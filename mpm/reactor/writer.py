@@ -84,7 +84,7 @@ class Writer:
         directory, course = self.directory, self.course
         if directory is None:
             return
-        fields = records.fields(course.system)
+        fields = records.fields(course.system, directory.fields.precision)
 
         def write() -> None:
             directory.append_history(course.numbers)
