@@ -43,6 +43,16 @@ def largest(comm: MPI.Comm, values: ArrayLike) -> Floats:
     return result
 
 
+def total_and_largest(comm: MPI.Comm, sums: ArrayLike, sizes: ArrayLike) -> tuple[Floats, Floats]:
+    """`total` of the `sums` and `largest` of the `sizes`, (n,) each, in one exchange: sums in the order of the ranks."""
+    added, compared = np.asarray(sums, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
+    local = np.concatenate([added, compared])
+    everybody = np.empty((comm.size, len(local)))
+    comm.Allgather(local, everybody)
+    found = everybody[:, len(added) :].max(axis=0)  # which a NaN is
+    return everybody[:, : len(added)].sum(axis=0), np.where(np.isnan(found), np.inf, found)
+
+
 def any_rank(comm: MPI.Comm, flag: bool) -> bool:
     """True on every rank as soon as it is true on one."""
     return bool(comm.allreduce(bool(flag), op=MPI.LOR))

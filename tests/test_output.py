@@ -149,7 +149,7 @@ def test_what_changes_under_a_known_name_is_written_anew() -> None:
 
 
 def test_what_is_not_wanted_is_not_unpacked(run: RunDirectory) -> None:
-    """Fails when a reader that wants some fields gets others, none, or those of another file, or when a name that no file has is an error."""
+    """Fails when a reader that wants some fields gets others or none, or when a name that no file has is an error."""
     whole, some = run.read_fields(1), run.read_fields(1, ["C_TMA", "nothing"])
     assert list(some.cell_data) == ["C_TMA"]
     assert np.array_equal(some.cell_data["C_TMA"], whole.cell_data["C_TMA"])

@@ -21,6 +21,7 @@ from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
 FLAGS = ["-O3", "-fno-math-errno", "-ffp-contract=fast", "-fopenmp-simd", "-fvisibility=hidden"]
 _BUILDER = cffi.FFI()
+_KINDS = {kind: _BUILDER.typeof(f"{kind}[]") for kind in ("double", "long")}
 _loaded: dict[tuple[Path, tuple[tuple[str, int], ...]], Any] = {}
 
 
@@ -87,4 +88,4 @@ def _module(name: str, library: Path) -> Any:
 
 def pointer(values: Floats | Ints, kind: str = "double") -> Any:
     """What C takes for a contiguous array, of float64 or of another `kind`: `long` are int64. It keeps the array alive."""
-    return _BUILDER.from_buffer(f"{kind}[]", values)
+    return _BUILDER.from_buffer(_KINDS[kind], values)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mpm.arrays import Floats
 from mpm.numerics.box_matrix import BoxMatrix, BoxSolver
-from mpm.parallel import largest, total
+from mpm.parallel import largest, total_and_largest
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Reactions
 from mpm.transport.step_matrix import StepMatrix
@@ -48,8 +48,11 @@ def quality(ports: Ports, residual: Floats, carried: float, made: Floats, new: F
     Measured by the feed, or by what is `made` [mol/m/s] where solids let gas go by themselves. `carried` [mol/m/s]: sum of the terms.
     """
     comm = ports.strip.comm
-    size, carried, turned = total(comm, [np.abs(residual).sum(), carried, np.abs(made).sum()])
-    lowest, most = largest(comm, [-new.min(initial=0.0), new.max(initial=ports.largest_feed)])
+    (size, carried, turned), (lowest, most) = total_and_largest(
+        comm,
+        [np.abs(residual).sum(), carried, np.abs(made).sum()],
+        [-new.min(initial=0.0), new.max(initial=ports.largest_feed)],
+    )
     scale = max(ports.feed_rate, float(turned), NO_FEED)
     worst = float(size / scale)
     converged = worst < max(RESIDUAL, ROUNDING * carried / scale)

@@ -288,5 +288,5 @@ class Transport:
             return reactions.in_cells(chosen[active], c, theta, dt)
 
         idle = IDLE * self.ports.feed_rate
-        balanced = balance_locally(np.maximum(before, LOWEST), here, inflow, sources, idle, tries=3)
+        balanced = balance_locally(np.maximum(before, LOWEST), here, inflow, sources, idle, tries=2)
         new[:, reactive[chosen]] = np.where(inflow > 0.0, balanced, 0.0)

@@ -17,6 +17,7 @@ FALL = 1e-13  # of a right-hand side, where that is not below what a step may le
 FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
 LOOSE = 10.0  # times what is wanted: a residual over the diagonal, which is near that over the pivots, with which a solution is taken
 CORRECTIONS = 4  # looks at the residual
+KNOWN = 1024  # matrices of which the heaviest entry is remembered: far more than a cycle has
 ROUNDING = 16.0 * np.finfo(float).eps  # of what a residual is the difference of
 NEVER = -1  # version of no operator
 TRACE = 1e-11  # of a right-hand side: what a step may leave of a species that is there in traces, which balance to 1e-9, too
@@ -63,7 +64,9 @@ class StepMatrix:
         self.version = NEVER  # of the operator
         self._fluxes, self._dt = BoxFluxes(strip), 0.0
         self._residual, self._fall = residual / np.sqrt(max(strip.grid.cells, 1)), fall
-        self._heaviest = 0.0  # entry of the diagonal
+        self._heaviest: dict[
+            tuple[int, float], float
+        ] = {}  # entry of the diagonal, by version and step: those of a cycle come again
         self._factorised = False
 
     @cached_property
@@ -92,7 +95,11 @@ class StepMatrix:
         held = self.strip.gas_volume[: self.strip.owned] if storage is None else storage
         self.diagonal[:] = operator.outflow + held / dt
         self.version, self._dt = operator.version, dt
-        self._heaviest = float(largest(self.strip.comm, [self.diagonal.max(initial=0.0)])[0])
+        if (self.version, dt) not in self._heaviest:
+            if len(self._heaviest) >= KNOWN:
+                self._heaviest.clear()
+            most = largest(self.strip.comm, [self.diagonal.max(initial=0.0)])[0]
+            self._heaviest[self.version, dt] = float(most)
         self._factorised = False
 
     def multiply(self, values: Floats, result: Floats | None = None) -> Floats:
@@ -106,25 +113,29 @@ class StepMatrix:
 
         The residual is looked at again in the end: what BiCGStab goes on from may have drifted away from it.
         """
-        size = self._norm(rhs)
+        missing = rhs - self.multiply(guess)
+        size, left = self._norms(rhs, missing)
         if size == 0.0:
             return np.zeros_like(rhs)
         if not self._factorised:
             self._krylov.factorise()
             self._factorised = True
-        least = min(max(self._residual / self._heaviest, self._fall * size), TRACE * size)
+        least = min(
+            max(self._residual / self._heaviest[self.version, self._dt], self._fall * size), TRACE * size
+        )
         found, enough = guess, least
         for _ in range(CORRECTIONS):
-            missing = rhs - self.multiply(found)
-            left = self._norm(missing)
             if left <= enough:
                 return found
             found = found + self._krylov.solve(missing[None], 0.0, least)[0][0]
-            enough = max(LOOSE * least, ROUNDING * max(size, self._norm(self.diagonal * found)))
+            missing = rhs - self.multiply(found)
+            left, carried = self._norms(missing, self.diagonal * found)
+            enough = max(LOOSE * least, ROUNDING * max(size, carried))
         raise ConvergenceError(
             f"{self.name}: a residual of {left:.3g} stays, over the diagonal, of {size:.3g}"
         )
 
-    def _norm(self, values: Floats) -> float:
-        """2-norm over the diagonal; collective."""
-        return float(np.sqrt(total(self.strip.comm, [((values / self.diagonal) ** 2).sum()])[0]))
+    def _norms(self, *several: Floats) -> list[float]:
+        """2-norms over the diagonal; collective."""
+        squares = [((values / self.diagonal) ** 2).sum() for values in several]
+        return [float(norm) for norm in np.sqrt(total(self.strip.comm, squares))]
