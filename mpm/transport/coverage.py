@@ -67,6 +67,13 @@ class Coverage:
         self.scatter = Scatter(
             strip.comm, self.place * grid.columns + strip.column[self.cells], len(self.rows) * grid.columns
         )
+        place_of_moving = np.cumsum(grid.moving[self.rows]) - 1
+        self._moving = np.flatnonzero(grid.moving[self.rows][self.place])
+        self._sliding = Scatter(
+            strip.comm,
+            place_of_moving[self.place[self._moving]] * grid.columns + strip.column[self.cells[self._moving]],
+            len(self.moving_rows) * grid.columns,
+        )
         self._row_surface, self._row_sites = surface[self.rows], density[self.rows]
         self.surface, self.sites = self._row_surface[self.place], self._row_sites[self.place]
         self.area = np.asarray(self.surface * strip.volume[self.cells])
@@ -114,13 +121,14 @@ class Coverage:
         target = int(np.copysign(columns, self.distance))
         count = target - self.shifted
         if count and len(self.moving_rows):
-            whole = self.whole()
-            moving, exchanged = self._columns.shift(whole[:, self.moving_rows], count)
-            grid = self.strip.grid
+            grid, shape = self.strip.grid, (len(self._theta), len(self.moving_rows), self.columns)
+            whole = self._sliding.to_all(self._theta.take(self._moving, axis=1)).reshape(shape)
+            moved, exchanged = self._columns.shift(whole, count)
             capacity = (self._row_surface * self._row_sites * grid.dy[self.rows] * grid.dx)[self.moving_rows]
             self.passed = self.passed + exchanged @ capacity
-            whole[:, self.moving_rows] = moving
-            self._theta = self.scatter.to_local(whole.reshape(len(whole), len(self.rows) * self.columns))
+            theta = self._theta.copy()
+            theta[:, self._moving] = self._sliding.to_local(moved.reshape(len(moved), -1))
+            self._theta = theta
         self.shifted = target
         return count
 
