@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mpm import parallel
+from mpm.arrays import Floats
 from mpm.case.case import Case
 from mpm.errors import InputError
 from mpm.parallel import Scatter, on_root, total
@@ -142,7 +143,7 @@ def test_gathers_of_any_order_and_shape(
     order = np.random.default_rng(3).permutation(size)
     owner = np.random.default_rng(4).integers(COMM.size, size=size)
     scatter = Scatter(COMM, order[owner == COMM.rank], size)
-    whole = np.random.default_rng(5).random((*lead, size)).astype(kind)
+    whole: Floats = np.random.default_rng(5).random((*lead, size)).astype(kind)
     local = scatter.to_local(whole)
     everywhere = scatter.to_all(local)
     np.testing.assert_array_equal(everywhere, whole)
