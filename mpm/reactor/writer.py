@@ -99,7 +99,7 @@ class Writer:
         number = self.last_cycle.number(step)
         if directory is None or number is None:
             return
-        usual = records.fields(system)
+        usual = records.fields(system, directory.phases.precision)
 
         def write() -> None:
             fields = phase_fields(usual, system.case, system.grid, motion, step)

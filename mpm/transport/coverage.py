@@ -127,7 +127,7 @@ class Coverage:
             capacity = (self._row_surface * self._row_sites * grid.dy[self.rows] * grid.dx)[self.moving_rows]
             self.passed = self.passed + exchanged @ capacity
             theta = self._theta.copy()
-            theta[:, self._moving] = self._sliding.to_local(moved.reshape(len(moved), -1))
+            theta[:, self._moving] = self._sliding.to_local(moved.reshape(len(moved), self._sliding.size))
             self._theta = theta
         self.shifted = target
         return count

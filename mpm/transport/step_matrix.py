@@ -16,7 +16,7 @@ from mpm.transport.fluxes import FluxOperator
 FALL = 1e-13  # of a right-hand side, where that is not below what a step may leave before
 FALL_HEATED = 3e-15  # of that in gas that expands, so that what is uniform there stays so to 1e-12: little more than rounding
 LOOSE = 10.0  # times what is wanted: a residual over the diagonal, which is near that over the pivots, with which a solution is taken
-CORRECTIONS = 4  # looks at the residual
+CORRECTIONS = 4  # of what a residual still misses
 KNOWN = 1024  # matrices of which the heaviest entry is remembered: far more than a cycle has
 ROUNDING = 16.0 * np.finfo(float).eps  # of what a residual is the difference of
 NEVER = -1  # version of no operator
@@ -64,9 +64,8 @@ class StepMatrix:
         self.version = NEVER  # of the operator
         self._fluxes, self._dt = BoxFluxes(strip), 0.0
         self._residual, self._fall = residual / np.sqrt(max(strip.grid.cells, 1)), fall
-        self._heaviest: dict[
-            tuple[int, float], float
-        ] = {}  # entry of the diagonal, by version and step: those of a cycle come again
+        # largest entry of the diagonal, by version and step: those of a cycle come again
+        self._heaviest: dict[tuple[int, float], float] = {}
         self._factorised = False
 
     @cached_property
@@ -126,11 +125,13 @@ class StepMatrix:
         found, enough = guess, least
         for _ in range(CORRECTIONS):
             if left <= enough:
-                return found
+                break
             found = found + self._krylov.solve(missing[None], 0.0, least)[0][0]
             missing = rhs - self.multiply(found)
             left, carried = self._norms(missing, self.diagonal * found)
             enough = max(LOOSE * least, ROUNDING * max(size, carried))
+        if left <= enough:
+            return found
         raise ConvergenceError(
             f"{self.name}: a residual of {left:.3g} stays, over the diagonal, of {size:.3g}"
         )
