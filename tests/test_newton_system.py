@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from mpm.errors import ConvergenceError
 from mpm.physics.kinetics import BENT, SurfaceKinetics
 from mpm.reactor.reactor import Reactor
 from mpm.transport.newton import NewtonSystem, mutual_coupling
-from mpm.transport.step_matrix import StepMatrix
+from mpm.transport.step_matrix import CORRECTIONS, StepMatrix
 
 from .cases import SHORT, TINY, cycle, zone
 
@@ -40,6 +41,36 @@ def test_reactions_in_the_gas_enter_the_step(strength: float, one_way: bool) -> 
     fluxes = transport.flux_product(operators[:2], step) + storage * step
     sources = np.einsum("nij,jn->in", blocks, step) - diagonal * step
     np.testing.assert_allclose(fluxes + sources, residual, atol=1e-9)
+
+
+def test_the_last_correction_of_a_product_counts() -> None:
+    """Fails when a residual that the last correction takes away is an error all the same, or one that stays is none."""
+    system = Reactor(zone(SHORT, TINY)).system
+    matrix = StepMatrix(system.strip, "product", 0.0)
+    matrix.update(system.operators(system.velocity)[0], 0.05)
+    rhs, solver = np.random.default_rng(5).random(system.strip.owned), matrix._krylov
+
+    class Late:
+        """Corrects nothing before its `first` call."""
+
+        def __init__(self, first: int):
+            self.left = first
+
+        def factorise(self) -> None:
+            solver.factorise()
+
+        def solve(self, missing: np.ndarray, tolerance: float, least: float) -> tuple[np.ndarray, int]:
+            self.left -= 1
+            return (np.zeros_like(missing), 0) if self.left > 0 else solver.solve(missing, tolerance, least)
+
+    def found(first: int) -> np.ndarray:
+        matrix.__dict__["_krylov"] = Late(first)
+        return matrix.solve(rhs, np.zeros_like(rhs))
+
+    solver.factorise()
+    np.testing.assert_allclose(matrix.multiply(found(CORRECTIONS)), rhs, rtol=1e-9, atol=1e-9)
+    with pytest.raises(ConvergenceError, match="a residual of"):
+        found(CORRECTIONS + 1)
 
 
 def test_mutual_coupling() -> None:

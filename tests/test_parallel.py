@@ -9,7 +9,7 @@ from mpm import parallel
 from mpm.arrays import Floats
 from mpm.case.case import Case
 from mpm.errors import InputError
-from mpm.parallel import Scatter, on_root, total
+from mpm.parallel import Scatter, on_root, total, total_and_largest
 from mpm.reactor.reactor import Reactor
 
 from .cases import HEATED, MPI, SHORT, TINY, assert_same_numbers, cycle, run, zone
@@ -126,6 +126,14 @@ def test_gathers_of_uneven_and_empty_shares() -> None:
     assert (root is None) == (COMM.rank != 0)
     nothing = Scatter(COMM, np.empty(0, np.int64), 0)
     assert nothing.to_all(np.empty((3, 0))).shape == (3, 0)
+
+
+def test_sums_and_maxima_of_one_exchange() -> None:
+    """Fails when a sum or a maximum misses a rank, or what is no number on one rank does not count as infinite on all."""
+    rank, last = COMM.rank, COMM.size - 1
+    sums, most = total_and_largest(COMM, [1.0, rank], [-rank, rank, np.nan if rank == last else 0.0])
+    np.testing.assert_array_equal(sums, [COMM.size, sum(range(COMM.size))])
+    np.testing.assert_array_equal(most, [0.0, last, np.inf])
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])

@@ -10,14 +10,16 @@ import pytest
 from mpm.advice.checks import check_case
 from mpm.advice.idle import idle_keys
 from mpm.case.case import Case
-from mpm.errors import InputError, Interrupted
+from mpm.errors import ConvergenceError, InputError, Interrupted
 from mpm.mesh.grid import Grid
 from mpm.motion.kinematics import BedMotion
 from mpm.motion.schedule import Schedule
 from mpm.output.directory import RunDirectory
 from mpm.output.phases import LastCycle, phase_fields
 from mpm.output.vtu import Snapshot
+from mpm.reactor import records
 from mpm.reactor.reactor import Reactor
+from mpm.reactor.system import System
 
 from .cases import MPI, TINY, assert_same_numbers, zone
 
@@ -40,6 +42,24 @@ def resolved(**changes: Any) -> Case:
 def phases(folder: Path) -> list[Snapshot]:
     series = RunDirectory(folder).phases
     return [series.read(index) for index in range(len(series.steps))]
+
+
+@pytest.mark.parametrize("name", ["fields", "phases"])
+def test_what_is_beyond_the_precision_of_the_files_ends_the_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder
+) -> None:
+    """Fails when a number beyond single precision is written as infinite, among fields or phases, or numpy has the word."""
+    usual, limit = records.local_fields, 0.0 if name == "fields" else 0.2
+
+    def enormous(system: System) -> dict[str, np.ndarray]:
+        fields = usual(system)
+        return {**fields, "pressure": 1e39 + fields["pressure"]} if reactor.time > limit else fields
+
+    monkeypatch.setattr(records, "local_fields", enormous)
+    reactor = Reactor(resolved(output__every="0.25 s" if name == "phases" else "0.1 s"), COMM)
+    with pytest.raises(ConvergenceError, match=rf"{name}_\d+\.vtu: pressure is not finite"):
+        reactor.run(output=tmp_path / "run")
+    assert not [warning for warning in recwarn if issubclass(warning.category, RuntimeWarning)]
 
 
 def assert_same_phases(one: Path, other: Path, tolerance: float = 0.0) -> None:

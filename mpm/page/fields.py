@@ -158,7 +158,8 @@ def read_film(
     """Read the stored fields of a run, of each at most about `values` numbers: evenly chosen times, then joined cells.
 
     `wanted` makes of each snapshot, which holds no more than what is `stored` under these names, an array of cells (rows, columns) or of
-    corners (one more each). Times whose file is missing or damaged are left out, which one line to `say` tells.
+    corners (one more each). Times whose file is missing, or damaged in what is read of it, are left out, which one line to
+    `say` tells.
     """
     grid = run.grid
     cells = grid.cells

@@ -110,7 +110,8 @@ def local_fields(system: System) -> dict[str, Floats]:
 def fields(system: System, precision: str = "Float64") -> dict[str, Floats]:
     """All cell fields for the files, in the grid's order and in the `precision` of the files, on rank 0 (empty elsewhere)."""
     local = local_fields(system)
-    stacked = np.stack(list(local.values()), dtype=precision.lower(), casting="same_kind")
+    with np.errstate(over="ignore"):  # who writes the files says it
+        stacked = np.stack(list(local.values()), dtype=precision.lower(), casting="same_kind")
     values = system.strip.scatter.to_root(stacked)
     if values is None:
         return {}
