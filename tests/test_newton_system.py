@@ -6,7 +6,8 @@ import pytest
 from mpm.errors import ConvergenceError
 from mpm.physics.kinetics import BENT, SurfaceKinetics
 from mpm.reactor.reactor import Reactor
-from mpm.transport.newton import NewtonSystem, mutual_coupling
+from mpm.transport.local_terms import mutual_coupling
+from mpm.transport.newton import NewtonSystem
 from mpm.transport.step_matrix import CORRECTIONS, StepMatrix
 
 from .cases import SHORT, TINY, cycle, zone
@@ -36,7 +37,8 @@ def test_reactions_in_the_gas_enter_the_step(strength: float, one_way: bool) -> 
     diagonal = np.stack([matrix.diagonal for matrix in matrices])
     residual = np.random.default_rng(4).standard_normal(diagonal.shape)
     blocks = random_blocks(diagonal, strength, one_way)
-    step = newton.solve(blocks, residual, 1e-12)
+    newton.blocks[:] = blocks
+    step = newton.solve(residual, 1e-12, mutual_coupling(blocks))
     storage = transport.reactions.gas_volume / dt
     fluxes = transport.flux_product(operators[:2], step) + storage * step
     sources = np.einsum("nij,jn->in", blocks, step) - diagonal * step

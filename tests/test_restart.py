@@ -326,7 +326,7 @@ def test_killed_at_random_moments(tmp_path: Path, mpirun: Any) -> None:
     """Fails when SIGKILL at any moment leaves a directory that cannot be resumed, or one whose resumed run differs: by more than 1e-12 on
     one rank (and by a byte of history.csv), or more than 1e-8 on two. scripts/kill_test.py does it a hundred times."""
     case, seed = (
-        zone({**LONG, "time.end": "8 s"}, TINY),
+        zone({**LONG, "time.end": "20 s"}, TINY),
         random.randrange(10**6),
     )  # longer than all moments together
     print(f"seed of the moments: {seed}")

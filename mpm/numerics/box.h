@@ -22,9 +22,10 @@ typedef struct {
     const double *couplings;       /* (parts, UNKNOWNS, 4, cells), of one unknown times the inverse pivots */
     double *inverse, *excess;      /* P^-1 and P^-1 D - 2, (parts, cells, UNKNOWNS, UNKNOWNS) */
     int acting;                    /* pairs of parts of which one acts on the other */
-    const long *pairs;             /* (acting, 3): the part acted on, that which acts, where the entries of the pair end */
-    const long *cells;             /* of each entry */
-    const double *entries;         /* P^-1 D */
+    long *pairs;                   /* (acting, 3): the part acted on, that which acts, where the entries of the pair end */
+    long *cells;                   /* of each entry */
+    double *entries;               /* P^-1 D */
+    double *own;                   /* (parts, cells), blocks within parts where there are several */
     double *x, *nothing;           /* (parts, UNKNOWNS, rows + cells + rows) */
     double *column, *beyond;       /* (parts, UNKNOWNS, rows) */
     double *edges;                 /* what boxes add to each other's pivots, (START, END, ours; parts, rows, UNKNOWNS, UNKNOWNS) */
@@ -32,5 +33,6 @@ typedef struct {
 } Factor;
 
 void multiply(Box *box, const double *couplings, const double *blocks, double *x, double *result);
-void renew(Box *box, Factor *factor, double relaxed, const double *couplings, const double *blocks, double *swept);
+void miss(Box *box, const double *couplings, const double *blocks, double *x, const double *rhs, double *result, double *squares);
+void renew(Box *box, Factor *factor, double relaxed, double least, const double *couplings, const double *blocks, double *swept);
 int solve(Box *box, Factor *factor, const double *rhs, double tolerance, double least, int limit, double *x, double *left);

@@ -14,12 +14,6 @@
 #define COUPLING(which, i, k) couplings[(4L * (i) + which) * cells + (k)]
 enum { BEFORE, AFTER, BELOW, ABOVE };
 
-#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && __GNUC__ >= 12
-#define FAST __attribute__((target_clones("arch=x86-64-v3", "default"))) /* multiplies and adds at once where the processor can */
-#else
-#define FAST
-#endif
-
 /* Invert a block by elimination with pivots on the diagonal, in place. */
 static inline void invert(double *a)
 {
@@ -46,7 +40,7 @@ typedef struct {
     double *inverse, *excess, *swept;
 } Pivots;
 
-static inline __attribute__((always_inline)) void cell_pivot(const Pivots *s, int column, int row)
+INSIDE void cell_pivot(const Pivots *s, int column, int row)
 {
     const double *couplings = s->couplings, *blocks = s->blocks, *inverse = s->inverse;
     const int rows = s->rows;
@@ -106,7 +100,7 @@ typedef struct {
 } Sweep;
 
 /* `last` becomes there - P^-1 sum where `there` and all of `sum` but the term from `last` are known. */
-static inline __attribute__((always_inline)) void settle(const Sweep *s, long k, int towards, const double *there, double *sum, double *last)
+INSIDE void settle(const Sweep *s, long k, int towards, const double *there, double *sum, double *last)
 {
     const double *couplings = s->couplings;
     const long cells = s->cells;
@@ -122,7 +116,7 @@ static inline __attribute__((always_inline)) void settle(const Sweep *s, long k,
 }
 
 /* x of cell k = y - P^-1 U x: `across` is that of the column after it, `last` that above it, then its own. */
-static inline __attribute__((always_inline)) void cell_back(const Sweep *s, long k, int rows, int to_start, const double *across,
+INSIDE void cell_back(const Sweep *s, long k, int rows, int to_start, const double *across,
                                                             double *last)
 {
     const double *couplings = s->couplings;
@@ -138,7 +132,7 @@ static inline __attribute__((always_inline)) void cell_back(const Sweep *s, long
 
 /* f of cell k = y + H x - P^-1 L f: `across` is that of the column before it, `last` that below it, then its own; `beyond` that of a
    neighbour after it, or NULL. */
-static inline __attribute__((always_inline)) void cell_on(const Sweep *s, long k, int rows, const double *beyond, const double *across,
+INSIDE void cell_on(const Sweep *s, long k, int rows, const double *beyond, const double *across,
                                                           double *last)
 {
     const double *couplings = s->couplings;

@@ -23,7 +23,7 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.numerics.box import Box
-from mpm.numerics.compiled import compiled, pointer
+from mpm.numerics.compiled import Struct, compiled, pointer
 from mpm.numerics.messages import HANDLE, Neighbourhood
 
 RELAXED = 0.9  # from 0.8 to 1 the number of iterations hardly changes; 0 takes up to half as many again
@@ -56,6 +56,14 @@ class BoxMatrix:
         self._c.multiply(self._neighbours.known, *self._arrays, pointer(result))
         self._neighbours.check()
 
+    def miss(self, x: Floats, rhs: Floats) -> tuple[Floats, Floats]:
+        """rhs - A x, and the squares of `rhs` and of that over the diagonal and of `x`, summed over own cells; collective."""
+        self._own[:] = x
+        result, squares = np.empty(x.shape), np.zeros(3)
+        self._c.miss(self._neighbours.known, *self._arrays, *map(pointer, (rhs, result, squares)))
+        self._neighbours.check()
+        return result, squares
+
 
 class Factor:
     """The incomplete factor of `unknowns` per cell of a box, of which it couples so many `together`, and BiCGStab with it."""
@@ -63,7 +71,7 @@ class Factor:
     def __init__(self, box: Box, unknowns: int, together: int):
         self.box, self.parts, self.together = box, unknowns // together, together
         module = kernels(box, together)
-        self._c, self._known = module.lib, module.ffi.new("Factor *")
+        self._c, self._struct = module.lib, Struct(module, "Factor")
         self._neighbours = Neighbourhood(module, box, unknowns * together * box.rows)
         rows, cells, parts = box.rows, box.cells, self.parts
         self.inverse = np.zeros((parts, cells, together, together))  # of P
@@ -73,52 +81,32 @@ class Factor:
         shapes = dict.fromkeys(("x", "nothing"), wide) | dict.fromkeys(("column", "beyond"), narrow)
         shapes |= dict.fromkeys(("y", "p", "v", "t", "r", "shadow"), (unknowns, cells))
         shapes |= {"excess": self.inverse.shape, "edges": (3, parts, rows, together, together)}
-        self._room: dict[str, Any] = {}
-        self._lend(inverse=self.inverse, **{name: np.zeros(shape) for name, shape in shapes.items()})
-        self._known.parts = parts
-
-    def _lend(self, **arrays: Any) -> None:
-        """Let C have these arrays, by the names that it has for them."""
-        for name, array in arrays.items():
-            self._room[name] = pointer(array, "long" if array.dtype.kind == "i" else "double")
-            setattr(self._known, name, self._room[name])
+        shapes["own"] = (parts if parts > 1 else 0, cells)
+        pairs = parts * (parts - 1)
+        self._struct.lend(inverse=self.inverse, **{name: np.zeros(shape) for name, shape in shapes.items()})
+        self._struct.lend(pairs=np.zeros((pairs, 3), np.int64), cells=np.empty(pairs * cells + 1, np.int64))
+        self._struct.lend(
+            entries=np.empty(pairs * cells + 1)
+        )  # the last one is where what does not count goes
+        self._struct.known.parts = parts
 
     def renew(self, couplings: Floats, blocks: Floats, least: float = 0.0) -> None:
         """Take up a matrix, `couplings` and `blocks` as in BoxMatrix; collective.
 
         Blocks count between two parts where they are above `least` times the diagonal one of that which acts.
         """
-        parts, together = self.parts, self.together
-        own = blocks if parts == 1 else np.ascontiguousarray(np.einsum("nii->in", blocks))
         self._c.renew(
-            *(self._neighbours.known, self._known, RELAXED),
-            *map(pointer, (couplings, own, self._swept)),
+            *(self._neighbours.known, self._struct.known, RELAXED, least),
+            *map(pointer, (couplings, blocks, self._swept)),
         )
         self._neighbours.check()
-        self._lend(couplings=self._swept if together == 1 else couplings)
-        pairs, cells, entries = [], [np.zeros(0, np.int64)], [np.zeros(0)]
-        for i in range(parts):
-            for j in range(parts):
-                if i == j:
-                    continue
-                between = blocks[:, i, j]
-                there = np.flatnonzero(np.abs(between) > least * np.abs(blocks[:, j, j]))
-                if len(there):
-                    cells.append(there)
-                    entries.append(between[there] * self.inverse[i, there, 0, 0])
-                    pairs.append([i, j, sum(map(len, cells))])
-        self._lend(
-            pairs=np.array(pairs, np.int64).reshape(-1, 3),
-            cells=np.concatenate(cells),
-            entries=np.concatenate(entries),
-        )
-        self._known.acting = len(pairs)
+        self._struct.lend(couplings=self._swept if self.together == 1 else couplings)
 
     def solve(self, rhs: Floats, tolerance: float, least: float) -> tuple[Floats, int, float]:
         """As BoxSolver.solve, with -1 - n for n iterations that do not converge, and the residual that is left; collective."""
         x, left = np.empty((self.parts * self.together, self.box.cells)), np.zeros(1)
         iterations = self._c.solve(
-            *(self._neighbours.known, self._known, pointer(np.ascontiguousarray(rhs))),
+            *(self._neighbours.known, self._struct.known, pointer(np.ascontiguousarray(rhs))),
             *(tolerance, least, ITERATIONS, pointer(x), pointer(left)),
         )
         self._neighbours.check()

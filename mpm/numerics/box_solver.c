@@ -8,13 +8,52 @@
 #define NOTHING_ALONG 1e-14 /* share of a residual along that of the start below which nothing is left of it but rounding */
 #define ROUNDING 8.9e-16    /* of the difference of two squares */
 
-/* P of every part for `couplings` (parts, UNKNOWNS, 4, cells) and `blocks` (parts, cells, UNKNOWNS, UNKNOWNS). */
-void renew(Box *box, Factor *factor, double relaxed, const double *couplings, const double *blocks, double *swept)
+/* Take `blocks` (cells, parts, parts) apart: what couples a cell to itself within each part to factor->own (parts, cells). */
+static void take_apart(Factor *factor, long cells, const double *blocks)
+{
+    const long parts = factor->parts;
+    for (long part = 0; part < parts; ++part)
+        for (long k = 0; k < cells; ++k)
+            factor->own[part * cells + k] = blocks[(k * parts + part) * parts + part];
+}
+
+/* What of them couples two parts, times the inverse pivots: entries above `least` times the diagonal one of the part that acts. */
+static void pair_up(Factor *factor, long cells, double least, const double *blocks)
+{
+    const long parts = factor->parts;
+    long count = 0;
+    factor->acting = 0;
+    for (long i = 0; i < parts; ++i)
+        for (long j = 0; j < parts; ++j) {
+            const double *inverse = factor->inverse + i * cells;
+            const long before = count;
+            if (i == j)
+                continue;
+            for (long k = 0; k < cells; ++k) {
+                const double between = blocks[(k * parts + i) * parts + j];
+                factor->cells[count] = k;
+                factor->entries[count] = between * inverse[k];
+                count += fabs(between) > least * fabs(blocks[(k * parts + j) * parts + j]);
+            }
+            if (count > before) {
+                long *pair = factor->pairs + 3 * factor->acting++;
+                pair[0] = i;
+                pair[1] = j;
+                pair[2] = count;
+            }
+        }
+}
+
+/* P of every part for `couplings` (parts, UNKNOWNS, 4, cells) and `blocks` (cells, unknowns, unknowns), those of all parts. */
+void renew(Box *box, Factor *factor, double relaxed, double least, const double *couplings, const double *blocks, double *swept)
 {
     Piece pieces[3];
     const int rows = box->rows, parts = factor->parts, count = pieces_of(box, pieces);
     const long cells = (long)rows * box->columns, length = rows * BLOCK, all = parts * length;
     double *from[2] = {factor->edges, factor->edges + all}, *ours = factor->edges + 2 * all;
+    const double *own = parts > 1 ? factor->own : blocks;
+    if (parts > 1)
+        take_apart(factor, cells, blocks);
     for (int at = 0; at < count; ++at) {
         const Piece *piece = pieces + at;
         for (int side = START; side <= END; ++side)
@@ -22,7 +61,7 @@ void renew(Box *box, Factor *factor, double relaxed, const double *couplings, co
                 take(box, side, parts, length, length, from[side]);
         for (int part = 0; part < parts; ++part)
             find_pivots(rows, box->columns, piece->first, piece->end, relaxed, couplings + part * 4 * cells * UNKNOWNS,
-                        blocks + part * cells * BLOCK, from[START] + part * length, from[END] + part * length,
+                        own + part * cells * BLOCK, from[START] + part * length, from[END] + part * length,
                         factor->inverse + part * cells * BLOCK, factor->excess + part * cells * BLOCK, swept + part * 4 * cells);
         for (int side = START; side <= END; ++side) {
             if (!piece->at[side] || box->earlier[side])
@@ -36,6 +75,8 @@ void renew(Box *box, Factor *factor, double relaxed, const double *couplings, co
         }
     }
     finish(box);
+    if (parts > 1)
+        pair_up(factor, cells, least, blocks);
 }
 
 /* x of (P + U) x = P y to factor->x. */
@@ -229,6 +270,24 @@ int solve(Box *box, Factor *factor, const double *rhs, double tolerance, double 
     return done ? iteration : -1 - iteration;
 }
 
+/* rhs - result in place of a result; adds the squares of rhs and of that, over the diagonal, and of x. */
+FAST void compare(long cells, const double *restrict diagonal, const double *restrict x, const double *restrict rhs, double *restrict result,
+                  double *restrict squares)
+{
+    double all = 0.0, left = 0.0, known = 0.0;
+#pragma omp simd reduction(+ : all, left, known)
+    for (long k = 0; k < cells; ++k) {
+        const double share = 1.0 / diagonal[k * BLOCK], missing = rhs[k] - result[k];
+        result[k] = missing;
+        all += rhs[k] * share * (rhs[k] * share);
+        left += missing * share * (missing * share);
+        known += x[k] * x[k];
+    }
+    squares[0] += all;
+    squares[1] += left;
+    squares[2] += known;
+}
+
 /* A x to `result`; x (UNKNOWNS, rows + cells + rows) gets the columns of neighbours. */
 void multiply(Box *box, const double *couplings, const double *blocks, double *x, double *result)
 {
@@ -242,4 +301,13 @@ void multiply(Box *box, const double *couplings, const double *blocks, double *x
             take(box, side, UNKNOWNS, rows, width, x + (side == START ? 0 : cells + rows));
     finish(box);
     product(rows, box->columns, couplings, blocks, x, result);
+}
+
+/* rhs - A x to `result`; squares = of rhs and of that over the diagonal, and of x; x as in `multiply`. */
+void miss(Box *box, const double *couplings, const double *blocks, double *x, const double *rhs, double *result, double *squares)
+{
+    const long cells = (long)box->rows * box->columns, width = cells + 2 * box->rows;
+    multiply(box, couplings, blocks, x, result);
+    memset(squares, 0, 3 * sizeof(double));
+    EACH(i) compare(cells, blocks + i * (UNKNOWNS + 1), x + i * width + box->rows, rhs + i * cells, result + i * cells, squares);
 }

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import cffi
+import numpy as np
 
 from mpm.arrays import Floats, Ints
 from mpm.numerics.fem import cache_directory, cannot_compile
@@ -20,8 +21,13 @@ from mpm.parallel import any_rank, on_root
 from mpi4py import MPI  # isort: skip  (after the finite-element stack)
 
 FLAGS = ["-O3", "-fno-math-errno", "-ffp-contract=fast", "-fopenmp-simd", "-fvisibility=hidden"]
+FAST = Path(__file__).with_name("fast.c")
+"""What comes before all sources."""
 _BUILDER = cffi.FFI()
-_KINDS = {kind: _BUILDER.typeof(f"{kind}[]") for kind in ("double", "long")}
+_KINDS = {
+    np.dtype(kind).char: _BUILDER.typeof(f"{name}[]")
+    for kind, name in ((np.float64, "double"), (np.int64, "long"))
+}
 _loaded: dict[tuple[Path, tuple[tuple[str, int], ...]], Any] = {}
 
 
@@ -41,7 +47,7 @@ def compiled(comm: MPI.Comm, header: Path, *sources: Path, **constants: int) -> 
 def _load(comm: MPI.Comm, header: Path, sources: tuple[Path, ...], constants: dict[str, int]) -> Any:
     declarations = header.read_text()
     defined = "".join(f"#define {name} {value}\n" for name, value in constants.items())
-    text = defined + declarations + "".join(source.read_text() for source in sources)
+    text = defined + declarations + "".join(source.read_text() for source in (FAST, *sources))
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
     made_of = repr((text, declarations, FLAGS, cffi.__version__, suffix))
     name = f"{header.stem}_{hashlib.sha256(made_of.encode()).hexdigest()[:16]}"
@@ -86,6 +92,20 @@ def _module(name: str, library: Path) -> Any:
     return module
 
 
-def pointer(values: Floats | Ints, kind: str = "double") -> Any:
-    """What C takes for a contiguous array, of float64 or of another `kind`: `long` are int64. It keeps the array alive."""
-    return _BUILDER.from_buffer(_KINDS[kind], values)
+def pointer(values: Floats | Ints) -> Any:
+    """What C takes for a contiguous array: doubles, or longs for int64. It keeps the array alive."""
+    return _BUILDER.from_buffer(_KINDS[values.dtype.char], values)
+
+
+class Struct:
+    """One of the structs of a `module`, in `known`, with the arrays that are lent to it."""
+
+    def __init__(self, module: Any, name: str):
+        self.known = module.ffi.new(f"{name} *")
+        self._lent: dict[str, Any] = {}
+
+    def lend(self, **arrays: Floats | Ints) -> None:
+        """Let C have these arrays, contiguous, by the names that it has for them."""
+        for name, array in arrays.items():
+            self._lent[name] = pointer(array)
+            setattr(self.known, name, self._lent[name])

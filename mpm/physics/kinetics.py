@@ -89,7 +89,7 @@ class SurfaceKinetics:
         """theta' (sites, n) after `dt` [s] at the new concentrations (coupled, n) [mol/m3]."""
         rates = self._site_rates(concentration)
         if len(theta) == 2:
-            return self._two_sites(rates, theta, dt)[0]
+            return self._after(self._gains(rates, theta, dt)[0], theta)[0]
         return np.minimum(self._solve_sites(rates, dt, theta[:, None, :])[:, 0], 1.0)
 
     def rates(self, concentration: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
@@ -205,20 +205,25 @@ class SurfaceKinetics:
     def _two_sites(self, rates: Floats, theta: Floats, dt: float) -> tuple[Floats, Floats]:
         """Closed form for two kinds of sites: theta' (2, n) and d theta'/d q_r (reactions, 2, n).
 
-        theta_0' = (theta_0 + c) / (1 + a + c) and its complement, with a and c the turnover of either kind; as written, each stays in
-        [0, 1] in floating point too, because rounding is monotone.
+        theta_0' = (theta_0 + c) / (1 + a + c) and its complement, with a and c the turnover of either kind.
         """
         gain, share = self._gains(rates, theta, dt)
-        whole = 1.0 + gain[::-1]
-        whole += gain
-        new = theta + gain
-        new /= whole
+        new, whole = self._after(gain, theta)
         response = np.empty((len(self.reactions), *theta.shape))
         for r, s in enumerate(self.site):
             change = np.multiply(share[r], new[s], out=response[r, 1 - s])
-            change /= whole[0]
+            change /= whole
             np.negative(change, out=response[r, s])
         return new, response
+
+    @staticmethod
+    def _after(gain: Floats, theta: Floats) -> tuple[Floats, Floats]:
+        """theta' (2, n), which as written stays in [0, 1] in floating point too, because rounding is monotone; and 1 + a + c (n,)."""
+        whole = 1.0 + gain[1]
+        whole += gain[0]
+        new = theta + gain
+        new /= whole
+        return new, whole
 
 
 class GasKinetics:

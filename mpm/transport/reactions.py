@@ -83,6 +83,11 @@ class Reactions:
         return any(not law.gas_orders for reaction in self.surface.reactions for law in reaction.laws)
 
     @property
+    def nu_coupled(self) -> tuple[Floats, Floats]:
+        """What an event makes of the coupled species, (reactions, coupled), on surfaces and in the gas."""
+        return self._nu_surface[:, : self.coupled], self._nu_gas[:, : self.coupled]
+
+    @property
     def gas_volume(self) -> Floats:
         """Volume of the gas in own cells [m2]."""
         return self.strip.gas_volume[: self.strip.owned]

@@ -14,22 +14,21 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.flow.fields import FlowField, face_flow
 from mpm.flow.state import GasState
 from mpm.mesh.strip import Strip
-from mpm.numerics.local_newton import LOWEST, balance_locally
 from mpm.parallel import Scatter
-from mpm.physics.kinetics import SurfaceKinetics
 from mpm.physics.roles import Roles
+from mpm.transport.closed_forms import local_terms
 from mpm.transport.coverage import Coverage
 from mpm.transport.diffusant import Diffusant
 from mpm.transport.fluxes import FluxAssembler, FluxOperator
 from mpm.transport.foresight import REMEMBERED, Past, possible
 from mpm.transport.ledger import Entries, Ledger
+from mpm.transport.local_terms import LocalTerms, StepEquations
 from mpm.transport.newton import RESIDUAL, NewtonSystem, forcing, quality
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Events, Reactions
@@ -40,11 +39,9 @@ if TYPE_CHECKING:
 
 Operators = list[FluxOperator]  # of one velocity field, one per species
 NEWTON_LIMIT = 30
-IDLE = 1e-15  # of the feed: a residual of a cell that needs no work
 HALVINGS = 6
 # residual below which steps need no balanced cells; of general rate laws, which take long in a cell, the first balance has most of the gain
 BALANCED = 1e-2
-TURNED = 16.0  # times all places per step, from whose coverages the events of general laws follow: what rounding is of
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +86,10 @@ class Transport:
     def _newton(self) -> NewtonSystem:
         """Of steps alone: a steady state takes none."""
         return NewtonSystem(self.reactions)
+
+    @cached_property
+    def _terms(self) -> LocalTerms:
+        return local_terms(self.reactions, self._newton.blocks)
 
     def _assemble(self) -> None:
         """What builds operators, of a reactor at rest and in motion, in the present state of the gas."""
@@ -231,62 +232,27 @@ class Transport:
         self, operators: Operators, dt: float, old: Floats, supply: Floats, foreseen: Floats
     ) -> tuple[Floats, Events]:
         """Inexact Newton on the reacting species; returns their concentrations at the end of the step and the events of it."""
-        reactions, cells, theta = self.reactions, self.coverage.cells, self.coverage.theta
-        matrices, newton = self._matrices(operators, dt), self._newton
+        matrices, newton, terms = self._matrices(operators, dt), self._newton, self._terms
         newton.set_fluxes(matrices)
         diagonal = np.stack([matrix.diagonal for matrix in matrices])
-        rhs = reactions.gas_volume / dt * old + supply
-        closed = isinstance(reactions.surface, SurfaceKinetics)
-        held = 0.0 if closed else TURNED * self.coverage.capacity.sum() / dt
-        new = possible(foreseen, old)
-        self._balance(new, matrices, diagonal, rhs, dt)  # spares one iteration in four
+        rhs = self.reactions.gas_volume / dt * old + supply
+        step = StepEquations(diagonal, rhs, self.coverage.theta, dt)
+        new, feed = possible(foreseen, old), self.ports.feed_rate
+        terms.balance(step, new, self._products(matrices, new), feed)  # spares one iteration in four
         for _ in range(NEWTON_LIMIT):
-            rates, slopes = reactions.surface.rates(new.take(cells, axis=1), theta, dt)
-            gas_rates, gas_slopes = reactions.gas.rates(new)
-            events = reactions.events(rates, gas_rates)
-            made = reactions.made(events, slice(self.coupled))
-            residual = self._products(matrices, new) - rhs - made
-            let_go = made if reactions.start_by_themselves else made[:0]
-            at = quality(self.ports, residual, np.abs(diagonal * new).sum() + held, let_go, new)
+            iterate = terms.weigh(step, new, self._products(matrices, new))
+            at = quality(self.ports, iterate)
             if at.converged and at.positive:
-                return new, events
+                return new, iterate.events
             if not np.isfinite(at.worst):
                 break
-            if at.converged and not closed:
+            if at.converged and not terms.closed:
                 new = np.maximum(new, 0.0)  # rounding, as the residual is
                 continue
-            blocks = -reactions.slopes(slopes, gas_slopes)
-            for i in range(self.coupled):
-                blocks[:, i, i] += diagonal[i]
-            new = new - newton.solve(blocks, residual, forcing(at.worst))
-            if at.worst > BALANCED and closed:
-                self._balance(new, matrices, diagonal, rhs, dt)
+            new = new - newton.solve(iterate.residual, forcing(at.worst), at.mutual)
+            if at.worst > BALANCED and terms.closed:
+                terms.balance(step, new, self._products(matrices, new), feed)
         raise ConvergenceError(
             f"reacting species {', '.join(self.roles.coupled)}: Newton stopped after {NEWTON_LIMIT} iterations at a residual of "
             f"{at.worst:.3g} of the feed, lowest concentration {at.lowest:.3g} mol/m3"
         )
-
-    def _balance(
-        self, new: Floats, matrices: list[StepMatrix], diagonal: Floats, rhs: Floats, dt: float
-    ) -> None:
-        """Change the iterate `new` (coupled, own) in cells whose sites run out, so that they balance with their inflow under it.
-
-        A linear step sends the front too far or not far enough, because it does not see the sites of a cell run out
-        (`mpm.numerics.local_newton`); this takes a third off the Newton iterations. A linear step is right where what comes in would use
-        up next to none of the sites.
-        """
-        reactions, reactive, theta = self.reactions, self.coverage.cells, self.coverage.theta
-        products = self._products(matrices, new)
-        here, before, carried, held = (
-            values.take(reactive, axis=1) for values in (diagonal, new, products, rhs)
-        )
-        inflow = np.maximum(here * before - carried + held, 0.0)
-        chosen = np.flatnonzero(reactions.surface.bends(np.maximum(before, inflow / here), theta, dt))
-        here, before, inflow = (values.take(chosen, axis=1) for values in (here, before, inflow))
-
-        def sources(c: Floats, active: NDArray[np.intp]) -> tuple[Floats, Floats]:
-            return reactions.in_cells(chosen[active], c, theta, dt)
-
-        idle = IDLE * self.ports.feed_rate
-        balanced = balance_locally(np.maximum(before, LOWEST), here, inflow, sources, idle, tries=2)
-        new[:, reactive[chosen]] = np.where(inflow > 0.0, balanced, 0.0)

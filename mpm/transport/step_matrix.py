@@ -112,8 +112,7 @@ class StepMatrix:
 
         The residual is looked at again in the end: what BiCGStab goes on from may have drifted away from it.
         """
-        missing = rhs - self.multiply(guess)
-        size, left = self._norms(rhs, missing)
+        missing, size, left, _ = self._missing(guess, rhs)
         if size == 0.0:
             return np.zeros_like(rhs)
         if not self._factorised:
@@ -127,8 +126,7 @@ class StepMatrix:
             if left <= enough:
                 break
             found = found + self._krylov.solve(missing[None], 0.0, least)[0][0]
-            missing = rhs - self.multiply(found)
-            left, carried = self._norms(missing, self.diagonal * found)
+            missing, _, left, carried = self._missing(found, rhs)
             enough = max(LOOSE * least, ROUNDING * max(size, carried))
         if left <= enough:
             return found
@@ -136,7 +134,8 @@ class StepMatrix:
             f"{self.name}: a residual of {left:.3g} stays, over the diagonal, of {size:.3g}"
         )
 
-    def _norms(self, *several: Floats) -> list[float]:
-        """2-norms over the diagonal; collective."""
-        squares = [((values / self.diagonal) ** 2).sum() for values in several]
-        return [float(norm) for norm in np.sqrt(total(self.strip.comm, squares))]
+    def _missing(self, values: Floats, rhs: Floats) -> tuple[Floats, float, float, float]:
+        """What `values` miss of `rhs`; 2-norms over the diagonal of `rhs`, of that, and of what the diagonal makes of them; collective."""
+        missing, squares = self.matrix.miss(values, rhs)
+        size, left, carried = np.sqrt(total(self.strip.comm, squares))
+        return missing, float(size), float(left), float(carried)
