@@ -3,8 +3,6 @@
    MPI comes as the addresses of its functions in the library that mpi4py has loaded, and its handles as numbers: they are integers in
    some libraries and pointers in others, of HANDLE bytes, and nobody's header is needed. */
 
-#include <string.h>
-
 #if HANDLE == 4
 typedef int Handle;
 #else

@@ -32,6 +32,7 @@ typedef struct {
     double *y, *p, *v, *t, *r, *shadow; /* (parts, UNKNOWNS, cells) */
 } Factor;
 
+void couple(long cells, const long *numbers, const double *taken, double *couplings);
 void multiply(Box *box, const double *couplings, const double *blocks, double *x, double *result);
 void miss(Box *box, const double *couplings, const double *blocks, double *x, const double *rhs, double *result, double *squares);
 void renew(Box *box, Factor *factor, double relaxed, double least, const double *couplings, const double *blocks, double *swept);

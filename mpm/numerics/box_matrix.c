@@ -244,3 +244,10 @@ FAST void weigh(long cells, const double *restrict inverse, const double *restri
         y[i * cells + k] = sum;
     }
 }
+
+/* Couplings of all cells with the neighbours at one side: what has their `numbers` is taken there, nothing where they are below zero. */
+void couple(long cells, const long *restrict numbers, const double *restrict taken, double *restrict couplings)
+{
+    for (long k = 0; k < cells; ++k)
+        couplings[k] = numbers[k] < 0 ? 0.0 : -taken[numbers[k]];
+}

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from mpm.arrays import Floats
+from mpm.arrays import Floats, Ints
 from mpm.errors import ConvergenceError
 from mpm.numerics.box import Box
 from mpm.numerics.compiled import Struct, compiled, pointer
@@ -31,6 +31,7 @@ ITERATIONS = 1000  # of BiCGStab before it counts as failed
 HEADER = Path(__file__).with_name("box.h")
 SOURCES = [HEADER.with_name(name) for name in ("box.c", "box_matrix.c", "box_solver.c")]
 BEFORE, AFTER, BELOW, ABOVE = range(4)
+NOWHERE = -1  # in place of a number
 
 
 class BoxMatrix:
@@ -49,6 +50,10 @@ class BoxMatrix:
         self._x = np.zeros((unknowns, box.cells + 2 * box.rows))  # with the columns of neighbours
         self._own = self._x[:, box.rows : box.rows + box.cells]
         self._arrays = [pointer(a) for a in (self.couplings, self.blocks, self._x)]
+
+    def couple(self, side: int, numbers: Ints, taken: Floats) -> None:
+        """Take the couplings at a `side` of all cells from the negative of `taken`, of which each has its `numbers` (cells,), or NOWHERE."""
+        self._c.couple(self.box.cells, pointer(numbers), pointer(taken), pointer(self.couplings[0, side]))
 
     def multiply(self, x: Floats, result: Floats) -> None:
         """A x to `result`; collective."""

@@ -3,8 +3,6 @@
    An iteration goes through memory half as often as one of separate vector operations, adds up over ranks thrice, and starts again by itself
    where it breaks down. */
 
-#include <math.h>
-
 #define NOTHING_ALONG 1e-14 /* share of a residual along that of the start below which nothing is left of it but rounding */
 #define ROUNDING 8.9e-16    /* of the difference of two squares */
 

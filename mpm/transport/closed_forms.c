@@ -4,13 +4,11 @@
    reactive); events (SURFACE, reactive) and (GAS, own).
    Cells are done in tiles: what is known of them in between stays close to the processor, which does several of them at once. */
 
-#include <math.h>
-#include <string.h>
-
 #define TILE 64
 #define ROOM(count) ((count) > 0 ? (count) : 1)
 #define EACH(i) for (int i = 0; i < UNKNOWNS; ++i)
 #define CELLS(n, count) for (long n = 0; n < (count); ++n)
+#define TOGETHER(n, count) _Pragma("omp simd") CELLS(n, count) /* none of them knows of another */
 #define POSITIVE(a) ((a) > 0.0 ? (a) : 0.0)
 
 
@@ -25,47 +23,62 @@ INSIDE void clear(Tile *t)
     memset(t->slope, 0, sizeof t->slope);
 }
 
+/* Values of cells `here`, or without a list of those from `first`. */
+INSIDE void pick(double *values, const double *from, long count, const long *here, long first)
+{
+    if (here)
+        TOGETHER(n, count) values[n] = from[here[n]];
+    else
+        memcpy(values, from + first, count * sizeof(double));
+}
+
 /* Add one reaction with these `events` and their `slopes`, of which each makes `made`. */
 INSIDE void count_in(Tile *t, long count, const double *made, const double *events, const double (*slopes)[TILE])
 {
     EACH(i) {
-        CELLS(n, count) t->made[i][n] += made[i] * events[n];
-        EACH(j) CELLS(n, count) t->slope[i][j][n] += made[i] * slopes[j][n];
+        TOGETHER(n, count) t->made[i][n] += made[i] * events[n];
+        EACH(j) TOGETHER(n, count) t->slope[i][j][n] += made[i] * slopes[j][n];
     }
 }
 
-/* Add the reactions of gases with the sites of reactive cells `here`; theta' follows the gas as in SurfaceKinetics.rates. */
-INSIDE void on_surfaces(const Reacting *s, Tile *t, long count, const long *here, double dt, const double *theta, double (*events)[TILE])
+/* Add the reactions of gases with the sites of reactive cells `here`, or without a list of those from `first`; theta' follows the gas as in
+   SurfaceKinetics.rates. */
+INSIDE void on_surfaces(const Reacting *s, Tile *t, long count, const long *here, long first, double dt, const double *theta,
+                        double (*events)[TILE])
 {
     double gain[2][TILE] = {{0.0}}, now[2][TILE], inverse[TILE], share[ROOM(SURFACE)][TILE], slopes[UNKNOWNS][TILE];
+    pick(now[0], theta, count, here, first);
+    pick(now[1], theta + s->reactive, count, here, first);
     for (int r = 0; r < SURFACE; ++r) {
-        const double *turnover = s->turnover + r * s->reactive, times = dt * s->gain[r];
-        double *into = gain[1 - s->site[r]], *c = t->c[s->gas[r]];
-        CELLS(n, count) {
-            share[r][n] = times * turnover[here[n]];
+        const double *c = t->c[s->gas[r]], times = dt * s->gain[r];
+        double *into = gain[1 - s->site[r]];
+        pick(share[r], s->turnover + r * s->reactive, count, here, first);
+        TOGETHER(n, count) {
+            share[r][n] *= times;
             into[n] += share[r][n] * POSITIVE(c[n]);
         }
     }
-    CELLS(n, count) {
+    TOGETHER(n, count) {
         inverse[n] = 1.0 / (1.0 + gain[0][n] + gain[1][n]);
-        now[0][n] = (theta[here[n]] + gain[0][n]) * inverse[n];
-        now[1][n] = (theta[s->reactive + here[n]] + gain[1][n]) * inverse[n];
+        now[0][n] = (now[0][n] + gain[0][n]) * inverse[n];
+        now[1][n] = (now[1][n] + gain[1][n]) * inverse[n];
     }
     for (int r = 0; r < SURFACE; ++r) {
         const int g = s->gas[r], site = s->site[r];
-        const double *on_area = s->on_area + r * s->reactive, *c = t->c[g];
-        double strength[TILE];
+        const double *c = t->c[g];
+        double strength[TILE], answering[TILE];
+        pick(strength, s->on_area + r * s->reactive, count, here, first);
         memset(slopes, 0, sizeof slopes);
-        CELLS(n, count) {
-            strength[n] = on_area[here[n]] * now[site][n];
-            events[r][n] = strength[n] * c[n];
-            slopes[g][n] = strength[n];
+        TOGETHER(n, count) {
+            slopes[g][n] = strength[n] * now[site][n];
+            events[r][n] = slopes[g][n] * c[n];
+            answering[n] = strength[n] * inverse[n] * POSITIVE(c[n]);
         }
         for (int other = 0; other < SURFACE; ++other) { /* how the coverage answers to the gas of each reaction */
             const int j = s->gas[other], from = s->site[other];
             const double sign = from == site ? -1.0 : 1.0;
-            CELLS(n, count) {
-                const double answer = sign * on_area[here[n]] * share[other][n] * now[from][n] * inverse[n] * POSITIVE(c[n]);
+            TOGETHER(n, count) {
+                const double answer = sign * answering[n] * share[other][n] * now[from][n];
                 slopes[j][n] += answer;
                 if (j != g) /* along the tangent below zero */
                     events[r][n] -= answer * POSITIVE(-t->c[j][n]);
@@ -75,21 +88,41 @@ INSIDE void on_surfaces(const Reacting *s, Tile *t, long count, const long *here
     }
 }
 
-/* Add the reactions of two gases in own cells `here`. */
-INSIDE void in_volume(const Reacting *s, Tile *t, long count, const long *here, double (*events)[TILE])
+/* Add the reactions of two gases in own cells `here`, or without a list in those from `first`. */
+INSIDE void in_volume(const Reacting *s, Tile *t, long count, const long *here, long first, double (*events)[TILE])
 {
-    double slopes[UNKNOWNS][TILE];
+    double slopes[UNKNOWNS][TILE], strength[TILE];
     for (int r = 0; r < GAS; ++r) {
-        const long a = s->pairs[2 * r], b = s->pairs[2 * r + 1];
-        const double *constant = s->in_volume + r * s->own;
+        const double *a = t->c[s->pairs[2 * r]], *b = t->c[s->pairs[2 * r + 1]];
+        double *by_a = slopes[s->pairs[2 * r]], *by_b = slopes[s->pairs[2 * r + 1]];
+        pick(strength, s->in_volume + r * s->own, count, here, first);
         memset(slopes, 0, sizeof slopes);
-        CELLS(n, count) {
-            const double k = constant[here[n]], first = POSITIVE(t->c[a][n]), second = POSITIVE(t->c[b][n]);
-            events[r][n] = k * first * second;
-            slopes[a][n] += t->c[a][n] > 0.0 ? k * second : 0.0;
-            slopes[b][n] += t->c[b][n] > 0.0 ? k * first : 0.0;
+        TOGETHER(n, count) {
+            const double one = POSITIVE(a[n]), two = POSITIVE(b[n]);
+            events[r][n] = strength[n] * one * two;
+            by_a[n] += a[n] > 0.0 ? strength[n] * two : 0.0;
+            by_b[n] += b[n] > 0.0 ? strength[n] * one : 0.0;
         }
         count_in(t, count, s->made_in_volume + r * UNKNOWNS, events[r], slopes);
+    }
+}
+
+/* Events on surfaces at concentrations c; what they make and its slopes to s->made and s->slope. */
+INSIDE void on_all_surfaces(const Reacting *s, double dt, const double *theta, const double *c, double *surface_events)
+{
+    Tile t;
+    double events[ROOM(SURFACE)][TILE];
+    for (long first = 0; first < s->reactive; first += TILE) {
+        const long count = s->reactive - first < TILE ? s->reactive - first : TILE, size = count * sizeof(double);
+        clear(&t);
+        EACH(i) pick(t.c[i], c + i * s->own, count, s->cells + first, 0);
+        on_surfaces(s, &t, count, 0, first, dt, theta, events);
+        for (int r = 0; r < SURFACE; ++r)
+            memcpy(surface_events + r * s->reactive + first, events[r], size);
+        EACH(i) {
+            memcpy(s->made + i * s->reactive + first, t.made[i], size);
+            EACH(j) memcpy(s->slope + (i * UNKNOWNS + j) * s->reactive + first, t.slope[i][j], size);
+        }
     }
 }
 
@@ -99,38 +132,25 @@ INSIDE void in_volume(const Reacting *s, Tile *t, long count, const long *here, 
 FAST void weigh(const Reacting *s, double dt, const double *theta, const double *c, const double *diagonal, const double *rhs,
                 double *residual, double *blocks, double *surface_events, double *gas_events, double *sums)
 {
-    Tile all, part;
-    double on_area[ROOM(SURFACE)][TILE], in_gas[ROOM(GAS)][TILE];
+    Tile all;
+    double in_gas[ROOM(GAS)][TILE];
     double missed = 0.0, carried = 0.0, lowest = INFINITY, largest = -INFINITY, mutual = 0.0;
-    long here[TILE], next = 0;
+    long next = 0;
+    on_all_surfaces(s, dt, theta, c, surface_events);
     for (long first = 0; first < s->own; first += TILE) {
         const long count = s->own - first < TILE ? s->own - first : TILE;
         clear(&all);
         EACH(i) memcpy(all.c[i], c + i * s->own + first, count * sizeof(double));
-        CELLS(n, count) here[n] = first + n;
-        in_volume(s, &all, count, here, in_gas);
+        in_volume(s, &all, count, 0, first, in_gas);
         for (int r = 0; r < GAS; ++r)
             memcpy(gas_events + r * s->own + first, in_gas[r], count * sizeof(double));
         const long begin = next;
         while (next < s->reactive && s->cells[next] < first + count)
             ++next;
-        const long with_sites = next - begin;
-        if (with_sites) {
-            clear(&part);
-            CELLS(n, with_sites) {
-                here[n] = begin + n;
-                EACH(i) part.c[i][n] = c[i * s->own + s->cells[begin + n]];
-            }
-            on_surfaces(s, &part, with_sites, here, dt, theta, on_area);
-            for (int r = 0; r < SURFACE; ++r)
-                memcpy(surface_events + r * s->reactive + begin, on_area[r], with_sites * sizeof(double));
-            CELLS(n, with_sites) {
-                const long at = s->cells[begin + n] - first;
-                EACH(i) {
-                    all.made[i][at] += part.made[i][n];
-                    EACH(j) all.slope[i][j][at] += part.slope[i][j][n];
-                }
-            }
+        EACH(i) {
+            CELLS(n, next - begin) all.made[i][s->cells[begin + n] - first] += s->made[i * s->reactive + begin + n];
+            EACH(j) CELLS(n, next - begin)
+                all.slope[i][j][s->cells[begin + n] - first] += s->slope[(i * UNKNOWNS + j) * s->reactive + begin + n];
         }
         EACH(i) {
             const double *d = diagonal + i * s->own + first, *right = rhs + i * s->own + first, *now = all.c[i];
@@ -203,8 +223,8 @@ INSIDE void settle(const Reacting *s, const Limits *limits, Tile *t, long count,
     CELLS(n, count) active[n] = 1;
     for (int tried = 0; tried < limits->tries && left; ++tried) {
         clear(t);
-        on_surfaces(s, t, count, here, dt, theta, on_area);
-        in_volume(s, t, count, there, in_gas);
+        on_surfaces(s, t, count, here, 0, dt, theta, on_area);
+        in_volume(s, t, count, there, 0, in_gas);
         CELLS(n, count) {
             double matrix[UNKNOWNS][UNKNOWNS], change[UNKNOWNS];
             int loose = 0, finite = 1;

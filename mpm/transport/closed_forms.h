@@ -12,6 +12,7 @@ typedef struct {
     const long *pairs;             /* (GAS, 2) gases that meet */
     const double *in_volume;       /* (GAS, own) k times the volume that they meet in */
     const double *made_in_volume;  /* (GAS, UNKNOWNS) */
+    double *made, *slope;          /* room for what is made on surfaces, (UNKNOWNS, reactive) and (UNKNOWNS, UNKNOWNS, reactive) */
 } Reacting;
 
 /* When a cell balances by itself. */

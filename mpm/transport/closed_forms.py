@@ -62,6 +62,8 @@ class ClosedForms(LocalTerms):
             pairs=np.array(gas.pairs, np.int64).reshape(-1, 2),
             made_on_area=np.ascontiguousarray(nu_surface),
             made_in_volume=np.ascontiguousarray(nu_gas),
+            made=np.empty((reactions.coupled, len(surface.sites))),
+            slope=np.empty((reactions.coupled, reactions.coupled, len(surface.sites))),
         )
         self._sums = np.zeros(5)
         self._heat: list[Floats] | None = None

@@ -9,7 +9,7 @@ import numpy as np
 from mpm.arrays import Floats
 from mpm.errors import ConvergenceError
 from mpm.mesh.strip import Strip
-from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, BoxMatrix, BoxSolver
+from mpm.numerics.box_matrix import ABOVE, AFTER, BEFORE, BELOW, NOWHERE, BoxMatrix, BoxSolver
 from mpm.parallel import largest, total
 from mpm.transport.fluxes import FluxOperator
 
@@ -31,9 +31,8 @@ class BoxFluxes:
         across = ~faces.vertical_flow
         left, right = (AFTER, BEFORE) if strip.box.leftwards else (BEFORE, AFTER)
         numbers = np.arange(len(faces.behind))
-        self._taken = np.zeros(2 * len(numbers) + 1)
-        # of each coupling its place among what faces take from behind, then from ahead, then a zero
-        self._places = np.full((4, own), 2 * len(numbers))
+        self._from_behind = (left, BELOW)  # the sides at which a cell takes what faces take from behind
+        self._faces = np.full((4, own), NOWHERE)  # at each side of each cell
         for side, cell, between in (
             (left, faces.ahead, across),
             (right, faces.behind, across),
@@ -41,14 +40,13 @@ class BoxFluxes:
             (ABOVE, faces.behind, faces.vertical_flow),
         ):
             mine = numbers[between & (cell < own)]
-            self._places[side, cell[mine]] = mine + (len(numbers) if cell is faces.behind else 0)
+            self._faces[side, cell[mine]] = mine
 
-    def enter(self, operator: FluxOperator, couplings: Floats) -> None:
-        """Make `couplings` of a BoxMatrix, (4, own) [m2/s], those of an operator."""
-        faces = len(operator.from_behind)
-        np.negative(operator.from_behind, out=self._taken[:faces])
-        np.negative(operator.from_ahead, out=self._taken[faces:-1])
-        np.take(self._taken, self._places, out=couplings, mode="clip")
+    def enter(self, operator: FluxOperator, matrix: BoxMatrix) -> None:
+        """Make the couplings of a matrix with one unknown, (4, own) [m2/s], those of an operator."""
+        for side in range(4):
+            taken = operator.from_behind if side in self._from_behind else operator.from_ahead
+            matrix.couple(side, self._faces[side], taken)
 
 
 class StepMatrix:
@@ -90,7 +88,7 @@ class StepMatrix:
         if (self.version, self._dt) == (operator.version, dt):
             return
         if self.version != operator.version:
-            self._fluxes.enter(operator, self.matrix.couplings[0])
+            self._fluxes.enter(operator, self.matrix)
         held = self.strip.gas_volume[: self.strip.owned] if storage is None else storage
         self.diagonal[:] = operator.outflow + held / dt
         self.version, self._dt = operator.version, dt
