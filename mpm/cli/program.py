@@ -6,6 +6,8 @@ Input is checked by every rank before MPI is loaded, so that bad input ends all 
 
 from __future__ import annotations
 
+import atexit
+import gc
 import logging
 import os
 import signal
@@ -28,6 +30,10 @@ _PATIENCE = 30.0
 """Seconds that a failing rank waits for the others to fail as well before it ends the whole job."""
 _FORWARDED = 0.5
 """Seconds that a launcher needs to pass on what a rank has printed: it drops the rest when the job is aborted."""
+
+atexit.register(
+    gc.freeze
+)  # a process that ends gives all memory back at once: to look for cycles first takes 0.13 s
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -52,7 +52,7 @@ class BoxMatrix:
         self._arrays = [pointer(a) for a in (self.couplings, self.blocks, self._x)]
 
     def couple(self, side: int, numbers: Ints, taken: Floats) -> None:
-        """Take the couplings at a `side` of all cells from the negative of `taken`, of which each has its `numbers` (cells,), or NOWHERE."""
+        """Let the couplings at a `side` be the negative of `taken`, of which each cell has its number in `numbers` (cells,), or NOWHERE."""
         self._c.couple(self.box.cells, pointer(numbers), pointer(taken), pointer(self.couplings[0, side]))
 
     def multiply(self, x: Floats, result: Floats) -> None:
