@@ -138,6 +138,15 @@ def test_what_is_no_number_is_told() -> None:
     assert not np.isfinite(compiled.weigh(step, new, flux).missed)
 
 
+def test_coverages_may_lie_in_any_order() -> None:
+    """Fails when coverages that were found otherwise, site by site for each cell, cannot be stepped from."""
+    system = Reactor(zone(SHORT, TINY)).system
+    system.coverage.become(np.asfortranarray(system.coverage.theta))
+    assert not system.coverage.theta.flags.c_contiguous
+    system.transport.advance(system.operators(system.velocity), 0.0, 0.01)
+    assert system.coverage.theta.max() <= 1.0
+
+
 def test_other_laws_stay_in_python() -> None:
     """Fails when reactions without a closed form get one."""
     reactions = Reactor(zone({**SHORT, **SIX_GASES}, TINY)).system.transport.reactions

@@ -116,8 +116,7 @@ INSIDE void settle(const Sweep *s, long k, int towards, const double *there, dou
 }
 
 /* x of cell k = y - P^-1 U x: `across` is that of the column after it, `last` that above it, then its own. */
-INSIDE void cell_back(const Sweep *s, long k, int rows, int to_start, const double *across,
-                                                            double *last)
+INSIDE void cell_back(const Sweep *s, long k, int rows, int to_start, const double *across, double *last)
 {
     const double *couplings = s->couplings;
     const long cells = s->cells, at = k + rows;
@@ -132,8 +131,7 @@ INSIDE void cell_back(const Sweep *s, long k, int rows, int to_start, const doub
 
 /* f of cell k = y + H x - P^-1 L f: `across` is that of the column before it, `last` that below it, then its own; `beyond` that of a
    neighbour after it, or NULL. */
-INSIDE void cell_on(const Sweep *s, long k, int rows, const double *beyond, const double *across,
-                                                          double *last)
+INSIDE void cell_on(const Sweep *s, long k, int rows, const double *beyond, const double *across, double *last)
 {
     const double *couplings = s->couplings;
     const long cells = s->cells, at = k + rows;

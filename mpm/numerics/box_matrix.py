@@ -89,10 +89,9 @@ class Factor:
         shapes["own"] = (parts if parts > 1 else 0, cells)
         pairs = parts * (parts - 1)
         self._struct.lend(inverse=self.inverse, **{name: np.zeros(shape) for name, shape in shapes.items()})
-        self._struct.lend(pairs=np.zeros((pairs, 3), np.int64), cells=np.empty(pairs * cells + 1, np.int64))
-        self._struct.lend(
-            entries=np.empty(pairs * cells + 1)
-        )  # the last one is where what does not count goes
+        # of as many entries as there can be, and one that does not count
+        self._struct.lend(cells=np.empty(pairs * cells + 1, np.int64), entries=np.empty(pairs * cells + 1))
+        self._struct.lend(pairs=np.zeros((pairs, 3), np.int64))
         self._struct.known.parts = parts
 
     def renew(self, couplings: Floats, blocks: Floats, least: float = 0.0) -> None:

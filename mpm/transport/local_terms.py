@@ -24,7 +24,8 @@ MUTUAL = 0.1
 class StepEquations:
     """fluxes(C) + storage = rhs + made(C), of the reacting species over a step of `dt` [s] from coverages `theta` (sites, reactive cells).
 
-    `diagonal` [m2/s] has storage and outflow of every cell, `rhs` [mol/m/s] what was there and what is supplied; both (coupled, own).
+    `diagonal` [m2/s] has storage and outflow of every cell, `rhs` [mol/m/s] what was there and what is supplied; both (coupled, own). All
+    are contiguous.
     """
 
     diagonal: Floats

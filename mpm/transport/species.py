@@ -236,7 +236,7 @@ class Transport:
         newton.set_fluxes(matrices)
         diagonal = np.stack([matrix.diagonal for matrix in matrices])
         rhs = self.reactions.gas_volume / dt * old + supply
-        step = StepEquations(diagonal, rhs, self.coverage.theta, dt)
+        step = StepEquations(diagonal, rhs, np.ascontiguousarray(self.coverage.theta), dt)
         new, feed = possible(foreseen, old), self.ports.feed_rate
         terms.balance(step, new, self._products(matrices, new), feed)  # spares one iteration in four
         for _ in range(NEWTON_LIMIT):
