@@ -114,6 +114,27 @@ def test_against_dense_algebra(rows: int, columns: int, closed: bool, unknowns: 
     np.testing.assert_array_equal(found, 0.0)  # what may be left is more than all
 
 
+@pytest.mark.parametrize("together", [False, True])
+@pytest.mark.parametrize("unknowns", [1, 2, 3])
+@pytest.mark.parametrize(("rows", "columns"), SHAPES)
+@pytest.mark.parallel
+def test_pivots_of_other_blocks(rows: int, columns: int, unknowns: int, together: bool) -> None:
+    """Fails when a factor that keeps its pivots solves the matrix that it had before, or has none to keep at first."""
+    matrix, dense, own = random_matrix(rows, columns, unknowns, False, 1.0)
+    solver, draw = BoxSolver(matrix, "a test"), np.random.default_rng(8)
+    x = draw.standard_normal((unknowns, rows * columns))
+    for _ in range(3):
+        solver.factorise(together, pivots=False)
+        rhs = (dense @ x.ravel()).reshape(x.shape)
+        found, iterations = solver.solve(rhs[:, own], 1e-12)
+        np.testing.assert_allclose(found, x[:, own], atol=1e-9)
+        assert iterations < 40
+        more = 0.3 * draw.random((rows * columns, unknowns, unknowns))
+        cells = np.arange(rows * columns)
+        dense.reshape(unknowns, rows * columns, unknowns, -1)[:, cells, :, cells] += more
+        matrix.blocks += more[own]
+
+
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parallel
 def test_the_factor_is_one_of_the_whole_matrix(closed: bool) -> None:

@@ -36,4 +36,5 @@ void couple(long cells, const long *numbers, const double *taken, double *coupli
 void multiply(Box *box, const double *couplings, const double *blocks, double *x, double *result);
 void miss(Box *box, const double *couplings, const double *blocks, double *x, const double *rhs, double *result, double *squares);
 void renew(Box *box, Factor *factor, double relaxed, double least, const double *couplings, const double *blocks, double *swept);
+void follow(Box *box, Factor *factor, double least, const double *blocks);
 int solve(Box *box, Factor *factor, const double *rhs, double tolerance, double least, int limit, double *x, double *left);

@@ -106,6 +106,10 @@ class Factor:
         self._neighbours.check()
         self._struct.lend(couplings=self._swept if self.together == 1 else couplings)
 
+    def follow(self, blocks: Floats, least: float = 0.0) -> None:
+        """Go on with the pivots of other blocks beside the same couplings."""
+        self._c.follow(self._neighbours.known, self._struct.known, least, pointer(blocks))
+
     def solve(self, rhs: Floats, tolerance: float, least: float) -> tuple[Floats, int, float]:
         """As BoxSolver.solve, with -1 - n for n iterations that do not converge, and the residual that is left; collective."""
         x, left = np.empty((self.parts * self.together, self.box.cells)), np.zeros(1)
@@ -129,16 +133,22 @@ class BoxSolver:
         self._factors: dict[int, Factor] = {}  # by the number of unknowns that each couples
         self._together = 1
 
-    def factorise(self, together: bool = False, coupled: float = 0.0) -> None:
+    def factorise(self, together: bool = False, coupled: float = 0.0, pivots: bool = True) -> None:
         """Take up the matrix as it is now, all unknowns of a cell `together` or each by itself; collective.
 
-        Each by itself, blocks count between two unknowns where they are above `coupled` times the diagonal one of that which acts.
+        Each by itself, blocks count between two unknowns where they are above `coupled` times the diagonal one of that which acts. Without
+        `pivots`, those of the last factor of this kind stay, for blocks that have changed little beside the same couplings.
         """
         matrix = self.matrix
         self._together = matrix.unknowns if together else 1
         if self._together not in self._factors:
             self._factors[self._together] = Factor(matrix.box, matrix.unknowns, self._together)
-        self._factors[self._together].renew(matrix.couplings, matrix.blocks, coupled)
+            pivots = True
+        factor = self._factors[self._together]
+        if pivots:
+            factor.renew(matrix.couplings, matrix.blocks, coupled)
+        else:
+            factor.follow(matrix.blocks, coupled)
 
     def solve(self, rhs: Floats, tolerance: float, least: float = 0.0) -> tuple[Floats, int]:
         """The solution (unknowns, cells) from a guess of nothing, and the number of iterations; collective. Raises ConvergenceError.

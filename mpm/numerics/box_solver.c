@@ -77,6 +77,23 @@ void renew(Box *box, Factor *factor, double relaxed, double least, const double 
         pair_up(factor, cells, least, blocks);
 }
 
+/* Go on with the pivots of other `blocks`, where those of these would be much the same: P^-1 D - 2, and what couples parts, are theirs. */
+void follow(Box *box, Factor *factor, double least, const double *blocks)
+{
+    const long cells = (long)box->rows * box->columns, parts = factor->parts;
+    const double *own = parts > 1 ? factor->own : blocks;
+    if (parts > 1)
+        take_apart(factor, cells, blocks);
+    for (long k = 0; k < parts * cells; ++k)
+        EACH(i) EACH(j) {
+            double product = i == j ? -2.0 : 0.0;
+            EACH(l) product += IN(factor->inverse, k, i, l) * IN(own, k, l, j);
+            IN(factor->excess, k, i, j) = product;
+        }
+    if (parts > 1)
+        pair_up(factor, cells, least, blocks);
+}
+
 /* x of (P + U) x = P y to factor->x. */
 static void go_back(Box *box, Factor *factor, const double *y)
 {

@@ -22,6 +22,8 @@ FORCING = 1e-2  # loosest inner tolerance of the inexact Newton iteration
 QUADRATIC = 0.3  # inner tolerance over the residual, whose next value is about its square in any case
 # what the inner tolerance aims at, and no further: traces far from their inlet are reported too
 LAST = 1e-5 * RESIDUAL
+# residual below which reactions change too little from one iterate to the next to need other pivots: no iteration more in any case tried
+SETTLED = 1e-2
 # share of a change of one unknown that is not missed in another: of a residual every Newton iteration leaves no more than that
 NEGLIGIBLE = 1e-12
 # backward-error floor, relative to the sum of |diagonal C| and what else the residual is a difference of: below is rounding, and accepted
@@ -69,6 +71,8 @@ class NewtonSystem:
         self._matrix = BoxMatrix(reactions.strip.box, reactions.coupled)
         self._solver = BoxSolver(self._matrix, "reacting species")
         self._versions: list[int] = []
+        # the residual over the feed of the iterate whose pivots the factor has, and which factor that is
+        self._pivots_at, self._together = float("inf"), False
 
     @property
     def blocks(self) -> Floats:
@@ -76,16 +80,24 @@ class NewtonSystem:
         return self._matrix.blocks
 
     def set_fluxes(self, matrices: Sequence[StepMatrix]) -> None:
-        """Enter the fluxes of the unknowns, those of their step's matrices."""
+        """Enter the fluxes of the unknowns, those of their step's matrices: another step begins."""
+        self._pivots_at = float("inf")
         versions = [matrix.version for matrix in matrices]
         if versions != self._versions:
             for couplings, matrix in zip(self._matrix.couplings, matrices, strict=True):
                 couplings[:] = matrix.couplings
             self._versions = versions
 
-    def solve(self, residual: Floats, tolerance: float, mutual: float) -> Floats:
-        """The step (unknowns, own) with the present `blocks`, the most of which are coupled by `mutual`; collective."""
-        self._solver.factorise(mutual > MUTUAL, NEGLIGIBLE)
+    def solve(self, residual: Floats, tolerance: float, mutual: float, worst: float = float("inf")) -> Floats:
+        """The step (unknowns, own) with the present `blocks`, the most of which are coupled by `mutual`; `worst` as in Quality; collective.
+
+        Pivots are those of the first iterate of a step that was not further off than SETTLED.
+        """
+        together = mutual > MUTUAL
+        pivots = self._pivots_at > SETTLED or together != self._together
+        self._solver.factorise(together, NEGLIGIBLE, pivots)
+        if pivots:
+            self._pivots_at, self._together = worst, together
         return self._solver.solve(residual, tolerance)[0]
 
 

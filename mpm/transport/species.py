@@ -249,7 +249,7 @@ class Transport:
             if at.converged and not terms.closed:
                 new = np.maximum(new, 0.0)  # rounding, as the residual is
                 continue
-            new = new - newton.solve(iterate.residual, forcing(at.worst), at.mutual)
+            new = new - newton.solve(iterate.residual, forcing(at.worst), at.mutual, at.worst)
             if at.worst > BALANCED and terms.closed:
                 terms.balance(step, new, self._products(matrices, new), feed)
         raise ConvergenceError(
