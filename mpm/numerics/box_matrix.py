@@ -89,8 +89,7 @@ class Factor:
         shapes["own"] = (parts if parts > 1 else 0, cells)
         pairs = parts * (parts - 1)
         self._struct.lend(inverse=self.inverse, **{name: np.zeros(shape) for name, shape in shapes.items()})
-        # of as many entries as there can be, and one that does not count
-        self._struct.lend(cells=np.empty(pairs * cells + 1, np.int64), entries=np.empty(pairs * cells + 1))
+        self._struct.lend(cells=np.empty(pairs * cells, np.int64), entries=np.empty(pairs * cells))
         self._struct.lend(pairs=np.zeros((pairs, 3), np.int64))
         self._struct.known.parts = parts
 

@@ -286,8 +286,8 @@ int solve(Box *box, Factor *factor, const double *rhs, double tolerance, double 
 }
 
 /* rhs - result in place of a result; adds the squares of rhs and of that, over the diagonal, and of x. */
-FAST void compare(long cells, const double *restrict diagonal, const double *restrict x, const double *restrict rhs, double *restrict result,
-                  double *restrict squares)
+FAST void compare(long cells, const double *restrict diagonal, const double *restrict x, const double *restrict rhs,
+                  double *restrict result, double *restrict squares)
 {
     double all = 0.0, left = 0.0, known = 0.0;
 #pragma omp simd reduction(+ : all, left, known)

@@ -25,7 +25,7 @@ FAST = Path(__file__).with_name("fast.c")
 """What comes before all sources."""
 _BUILDER = cffi.FFI()
 _KINDS = {
-    np.dtype(kind).char: _BUILDER.typeof(f"{name}[]")
+    np.dtype(kind): _BUILDER.typeof(f"{name}[]")
     for kind, name in ((np.float64, "double"), (np.int64, "long"))
 }
 _loaded: dict[tuple[Path, tuple[tuple[str, int], ...]], Any] = {}
@@ -94,7 +94,7 @@ def _module(name: str, library: Path) -> Any:
 
 def pointer(values: Floats | Ints) -> Any:
     """What C takes for a contiguous array: doubles, or longs for int64. It keeps the array alive."""
-    return _BUILDER.from_buffer(_KINDS[values.dtype.char], values)
+    return _BUILDER.from_buffer(_KINDS[values.dtype], values)
 
 
 class Struct:

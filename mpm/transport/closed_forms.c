@@ -1,4 +1,4 @@
-/* Reactions in the equations of a time step, cell after cell (mpm/transport/closed_forms.py and mpm/physics/kinetics.py have the equations).
+/* Reactions in the equations of a time step, cell after cell (equations: mpm/transport/closed_forms.py and mpm/physics/kinetics.py).
 
    Shapes, all contiguous: concentrations, fluxes, `diagonal` and `rhs` (UNKNOWNS, own); blocks (own, UNKNOWNS, UNKNOWNS); coverages (2,
    reactive); events (SURFACE, reactive) and (GAS, own).
@@ -10,7 +10,6 @@
 #define CELLS(n, count) for (long n = 0; n < (count); ++n)
 #define TOGETHER(n, count) _Pragma("omp simd") CELLS(n, count) /* none of them knows of another */
 #define POSITIVE(a) ((a) > 0.0 ? (a) : 0.0)
-
 
 /* Concentrations in some cells, what reactions make of each gas there [mol/m/s] and how that changes with each [m2/s]. */
 typedef struct {
@@ -213,7 +212,7 @@ INSIDE void solve_cell(double matrix[UNKNOWNS][UNKNOWNS], double *rhs)
     }
 }
 
-/* Newton's method in `count` cells of a tile by themselves, as in balance_locally; `here` among those with sites, `there` among own ones. */
+/* Newton's method in `count` cells of a tile by themselves, as in balance_locally; `here` among those with sites, `there` among all. */
 INSIDE void settle(const Reacting *s, const Limits *limits, Tile *t, long count, const long *here, const long *there, double dt,
                    const double *theta, const double *diagonal, double (*inflow)[TILE])
 {

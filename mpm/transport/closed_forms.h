@@ -7,7 +7,7 @@ typedef struct {
     const long *gas, *site;        /* (SURFACE,) what meets */
     const double *gain;            /* (SURFACE,) places that an event makes of the other kind of site */
     const double *turnover;        /* (SURFACE, reactive) k/n_s [m3/mol/s] */
-    const double *on_area;         /* (SURFACE, reactive) k times the area of a cell [m3/mol times m2/s per metre of depth] */
+    const double *on_area;         /* (SURFACE, reactive) k times the area of a cell [m2/s, per metre of depth] */
     const double *made_on_area;    /* (SURFACE, UNKNOWNS) of each gas per event */
     const long *pairs;             /* (GAS, 2) gases that meet */
     const double *in_volume;       /* (GAS, own) k times the volume that they meet in */

@@ -16,12 +16,13 @@ from mpm.arrays import Floats
 from mpm.numerics.compiled import Struct, compiled, pointer
 from mpm.numerics.local_newton import LOWEST, SHRINK, TIGHT
 from mpm.physics.kinetics import BENT, GasKinetics, SurfaceKinetics
-from mpm.transport.local_terms import IDLE, TRIES, LocalTerms, StepEquations, Weighed, mutual_coupling
+from mpm.transport.local_terms import IDLE, TRIES, LocalTerms, StepEquations, Weighed
 from mpm.transport.reactions import Events, Reactions
 
 HEADER = Path(__file__).with_name("closed_forms.h")
 SOURCE = HEADER.with_name("closed_forms.c")
 KINDS = 2  # of sites that have a closed form
+PAIR = 2  # unknowns of a cell whose mutual coupling C finds
 
 
 def local_terms(reactions: Reactions, blocks: Floats) -> LocalTerms:
@@ -65,7 +66,7 @@ class ClosedForms(LocalTerms):
             made=np.empty((reactions.coupled, len(surface.sites))),
             slope=np.empty((reactions.coupled, reactions.coupled, len(surface.sites))),
         )
-        self._sums = np.zeros(5)
+        self._sums, self._mutual = np.zeros(5), 0.0
         self._heat: list[Floats] | None = None
 
     def _follow_heat(self) -> None:
@@ -94,10 +95,12 @@ class ClosedForms(LocalTerms):
         )
         given = (step.theta, new, step.diagonal, step.rhs, flux, self.blocks, events.surface, events.gas)
         self._c.weigh(self._struct.known, step.dt, *map(pointer, given), pointer(self._sums))
-        missed, carried, lowest, largest, mutual = map(float, self._sums)
-        if self.reactions.coupled > 2:
-            mutual = mutual_coupling(self.blocks)
-        return Weighed(events, flux, missed, carried, 0.0, lowest, largest, mutual)
+        missed, carried, lowest, largest, self._mutual = map(float, self._sums)
+        return Weighed(events, flux, missed, carried, 0.0, lowest, largest)
+
+    def mutual(self) -> float:
+        """As LocalTerms.mutual; of two unknowns it has been found on the way."""
+        return self._mutual if self.reactions.coupled == PAIR else super().mutual()
 
     def balance(self, step: StepEquations, new: Floats, flux: Floats, feed: float) -> None:
         """As LocalTerms.balance, some cells at a time."""

@@ -38,7 +38,7 @@ class StepEquations:
 class Weighed:
     """An iterate on this rank: the `events` at it, the `residual` (coupled, own) [mol/m/s] that it leaves, the sum of that, of what cells
     hold (`carried`) and of what is `made` where gas is let go without any, each by magnitude [mol/m/s]; the `lowest` and the `largest`
-    concentration [mol/m3]; the largest share of a change that comes back to its unknown by way of others in a cell (`mutual`)."""
+    concentration [mol/m3]."""
 
     events: Events
     residual: Floats
@@ -47,7 +47,6 @@ class Weighed:
     made: float
     lowest: float
     largest: float
-    mutual: float
 
 
 class LocalTerms:
@@ -58,7 +57,10 @@ class LocalTerms:
         self.closed = isinstance(reactions.surface, SurfaceKinetics)
 
     def weigh(self, step: StepEquations, new: Floats, flux: Floats) -> Weighed:
-        """The iterate `new` (coupled, own), of which `flux` (coupled, own) [mol/m/s] is the product with storage and fluxes."""
+        """The iterate `new` (coupled, own), of which `flux` (coupled, own) [mol/m/s] is the product with storage and fluxes.
+
+        Both contiguous; the residual may take the place of `flux`.
+        """
         reactions, coupled = self.reactions, self.reactions.coupled
         rates, slopes = reactions.surface.rates(
             new.take(reactions.coverage.cells, axis=1), step.theta, step.dt
@@ -79,8 +81,11 @@ class LocalTerms:
             made=float(np.abs(made).sum()) if reactions.start_by_themselves else 0.0,
             lowest=float(new.min(initial=np.inf)),
             largest=float(new.max(initial=-np.inf)),
-            mutual=mutual_coupling(self.blocks),
         )
+
+    def mutual(self) -> float:
+        """Largest share of a change that comes back to its unknown by way of others in a cell, of the iterate weighed last."""
+        return mutual_coupling(self.blocks)
 
     def balance(self, step: StepEquations, new: Floats, flux: Floats, feed: float) -> None:
         """Change the iterate `new` in cells whose sites run out, so that they balance with their inflow under it; `feed` [mol/m/s].

@@ -9,7 +9,7 @@ import numpy as np
 
 from mpm.arrays import Floats
 from mpm.numerics.box_matrix import BoxMatrix, BoxSolver
-from mpm.parallel import total_and_largest
+from mpm.parallel import largest, total_and_largest
 from mpm.transport.local_terms import MUTUAL, Weighed
 from mpm.transport.ports import Ports
 from mpm.transport.reactions import Reactions
@@ -34,14 +34,13 @@ NO_FEED = 1e-300  # mol/m/s, in place of a feed of nothing where residuals are d
 
 @dataclass(frozen=True)
 class Quality:
-    """Of an iterate: its `worst` residual over the feed, whether that has `converged`, the `lowest` concentration [mol/m3], whether it
-    counts as `positive`, and the largest `mutual` coupling of unknowns in a cell."""
+    """Of an iterate: its `worst` residual over the feed, whether that has `converged`, the `lowest` concentration [mol/m3] and whether it
+    counts as `positive`."""
 
     worst: float
     converged: bool
     lowest: float
     positive: bool
-    mutual: float
 
 
 def quality(ports: Ports, iterate: Weighed) -> Quality:
@@ -49,25 +48,25 @@ def quality(ports: Ports, iterate: Weighed) -> Quality:
 
     Measured by the feed, or by what is made where solids let gas go by themselves.
     """
-    (size, carried, turned), (lowest, most, mutual) = total_and_largest(
+    (size, carried, turned), (lowest, most) = total_and_largest(
         ports.strip.comm,
         [iterate.missed, iterate.carried, iterate.made],
-        [max(-iterate.lowest, 0.0), max(iterate.largest, ports.largest_feed), iterate.mutual],
+        [max(-iterate.lowest, 0.0), max(iterate.largest, ports.largest_feed)],
     )
     scale = max(ports.feed_rate, float(turned), NO_FEED)
     worst = float(size / scale)
     converged = worst < max(RESIDUAL, ROUNDING * carried / scale)
-    return Quality(worst, bool(converged), -float(lowest), bool(lowest <= UNDERSHOOT * most), float(mutual))
+    return Quality(worst, bool(converged), 0.0 - float(lowest), bool(lowest <= UNDERSHOOT * most))
 
 
 class NewtonSystem:
     """The linear systems of Newton's method on the species that take part in `reactions`.
 
-    Reactions couple species in every cell, but mostly one way, or so weakly that each can have an incomplete factor of its own. Who weighs
-    an iterate writes the `blocks` (own, unknowns, unknowns) [m2/s] on the diagonal.
+    Reactions couple species in every cell, but mostly one way, or so weakly that each can have an incomplete factor of its own.
     """
 
     def __init__(self, reactions: Reactions):
+        self._comm = reactions.strip.comm
         self._matrix = BoxMatrix(reactions.strip.box, reactions.coupled)
         self._solver = BoxSolver(self._matrix, "reacting species")
         self._versions: list[int] = []
@@ -76,7 +75,7 @@ class NewtonSystem:
 
     @property
     def blocks(self) -> Floats:
-        """In place of those before them."""
+        """What couples the unknowns of each cell, (own, unknowns, unknowns) [m2/s]: written in place by who weighs an iterate."""
         return self._matrix.blocks
 
     def set_fluxes(self, matrices: Sequence[StepMatrix]) -> None:
@@ -89,12 +88,12 @@ class NewtonSystem:
             self._versions = versions
 
     def solve(self, residual: Floats, tolerance: float, mutual: float, worst: float = float("inf")) -> Floats:
-        """The step (unknowns, own) with the present `blocks`, the most of which are coupled by `mutual`; `worst` as in Quality; collective.
+        """The step (unknowns, own) with the present `blocks`, whose unknowns are coupled by up to `mutual` on this rank; collective.
 
-        Pivots are those of the first iterate of a step that was not further off than SETTLED.
+        Pivots are those of the first iterate of a step that was not further off (`worst`, as in Quality) than SETTLED, until one is again.
         """
-        together = mutual > MUTUAL
-        pivots = self._pivots_at > SETTLED or together != self._together
+        together = self._matrix.unknowns > 1 and float(largest(self._comm, [mutual])[0]) > MUTUAL
+        pivots = max(self._pivots_at, worst) > SETTLED or together != self._together
         self._solver.factorise(together, NEGLIGIBLE, pivots)
         if pivots:
             self._pivots_at, self._together = worst, together

@@ -201,7 +201,7 @@ class Transport:
         self.ledger.recall(memento.ledger)
 
     def _advance(self, operators: Operators, t0: float, dt: float) -> None:
-        old, coupled = self.concentration, self.coupled
+        old, coupled = np.ascontiguousarray(self.concentration), self.coupled
         drawn = self.ports.outlet_means(operators, old)
         shares = self.ports.shares(t0, dt)
         supply = self.ports.supply(operators, shares, drawn)
@@ -237,7 +237,7 @@ class Transport:
         diagonal = np.stack([matrix.diagonal for matrix in matrices])
         rhs = self.reactions.gas_volume / dt * old + supply
         step = StepEquations(diagonal, rhs, np.ascontiguousarray(self.coverage.theta), dt)
-        new, feed = possible(foreseen, old), self.ports.feed_rate
+        new, feed = np.ascontiguousarray(possible(foreseen, old)), self.ports.feed_rate
         terms.balance(step, new, self._products(matrices, new), feed)  # spares one iteration in four
         for _ in range(NEWTON_LIMIT):
             iterate = terms.weigh(step, new, self._products(matrices, new))
@@ -249,7 +249,7 @@ class Transport:
             if at.converged and not terms.closed:
                 new = np.maximum(new, 0.0)  # rounding, as the residual is
                 continue
-            new = new - newton.solve(iterate.residual, forcing(at.worst), at.mutual, at.worst)
+            new = new - newton.solve(iterate.residual, forcing(at.worst), terms.mutual(), at.worst)
             if at.worst > BALANCED and terms.closed:
                 terms.balance(step, new, self._products(matrices, new), feed)
         raise ConvergenceError(
