@@ -3,8 +3,8 @@ nothing written. A case fails when the line is missing, is more than one, names 
 
 import os
 import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -474,15 +474,12 @@ def test_layers_without_cells_name_the_key(folder: Path, capsys: pytest.CaptureF
     assert "geometry.layer.a.cells: found nothing" in refused(capsys, folder, "check", "case.toml")
 
 
-def test_every_rank_refuses_and_one_speaks(folder: Path) -> None:
+def test_every_rank_refuses_and_one_speaks(folder: Path, mpirun: Any) -> None:
     """Fails when a second rank prints, or when one of the three is left behind."""
     (folder / "case.toml").write_text(EXAMPLE.replace("gamma = 0.30", "gamma = -1"))
-    launcher = Path(sys.executable).with_name("mpirun")
-    if not launcher.exists():
-        pytest.skip("no mpirun beside this Python")
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PMI", "MPI", "HYDRA"))}
     done = subprocess.run(
-        [launcher, "-n", "3", sys.executable, "-m", "mpm", "run", "case.toml", "-o", "out"],
+        [*mpirun(3), "-m", "mpm", "run", "case.toml", "-o", "out"],
         capture_output=True, text=True, timeout=120, env=environment,
     )  # fmt: skip
     assert done.returncode == 2

@@ -2,8 +2,8 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -91,14 +91,11 @@ def test_ranks_sleep_where_cores_are_short(tmp_path: Path) -> None:
     assert alone == {"PMI_RANK": "0"}
 
 
-def test_versions_are_printed_once_by_two_ranks() -> None:
+def test_versions_are_printed_once_by_two_ranks(mpirun: Any) -> None:
     """Fails (it waited for ever) when only one rank starts MPI."""
-    launcher = Path(sys.executable).with_name("mpirun")
-    if not launcher.exists():
-        pytest.skip("no mpirun beside this Python")
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PMI", "MPI", "HYDRA"))}
     done = subprocess.run(
-        [launcher, "-n", "2", sys.executable, "-m", "mpm", "--version"],
+        [*mpirun(2), "-m", "mpm", "--version"],
         capture_output=True, text=True, timeout=300, env=environment,
     )  # fmt: skip
     assert done.returncode == 0 and done.stdout.count("python ") == 1, done.stderr

@@ -31,9 +31,8 @@ _PATIENCE = 30.0
 _FORWARDED = 0.5
 """Seconds that a launcher needs to pass on what a rank has printed: it drops the rest when the job is aborted."""
 
-atexit.register(
-    gc.freeze
-)  # a process that ends gives all memory back at once: to look for cycles first takes 0.13 s
+# a process that ends gives all memory back at once: to look for cycles first takes 0.13 s
+atexit.register(gc.freeze)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -166,7 +166,7 @@ def _work(toml_path: Path, seed: int, resume: bool, messages: Any) -> None:
                 Simulation(load_case(toml_path), seed, directory).run(resume, progress)
             except (InputError, ConvergenceError):
                 raise
-            except Exception:
+            except Exception:  # a defect, whose traceback nobody else would keep
                 traceback.print_exc(file=log)
                 raise
             finally:
